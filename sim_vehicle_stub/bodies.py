@@ -1,0 +1,127 @@
+"""The bodies of a fleet: one compiled call moves all of them, another reads what their sensors would say.
+
+What a vehicle's firmware makes of setpoints and modes arrives here as a command: a velocity or a place
+horizontally, a climb rate, a height or a landing vertically.  The motion itself is ``swarmctl.core.motion``.
+Ground is flat, at height zero; every vehicle starts standing on it.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarmctl.core.geodesy import to_geodetic
+from swarmctl.core.jit import kernel
+from swarmctl.core.motion import climb_rate_towards, horizontal, vertical
+from swarmctl.core.state import POSE
+
+Records = NDArray[Any]
+
+BODY = POSE
+
+# `powered`: motors run. `aim`: VELOCITY or PLACE. `lift`: CLIMB_RATE, HEIGHT or DESCENT. `east`, `north`:
+# m/s or m. `up`: m/s or m. `speed`, `climb`, `descent`: limits of this manoeuvre.
+COMMAND = np.dtype(
+    [(name, "<i8") for name in ("powered", "aim", "lift")]
+    + [(name, "<f8") for name in ("east", "north", "up", "speed", "climb", "descent", "landing")]
+)
+LIMITS = np.dtype([(name, "<f8") for name in ("speed", "acceleration", "climb_acceleration", "lag")])
+
+VELOCITY, PLACE = 0, 1
+CLIMB_RATE, HEIGHT, DESCENT = 0, 1, 2
+
+# Columns of what `read_sensors` fills: GLOBAL_POSITION_INT from `lat` to `vz`.
+WIRE_COLUMNS = ("lat", "lon", "alt", "relative_alt", "vx", "vy", "vz")
+
+SLOW_BELOW_M, FAST_ABOVE_M = 5.0, 10.0
+"""A landing descends at full speed above the one height and at landing speed below the other."""
+GRAVITY = 9.81
+
+
+@kernel
+def landing_rate(up: float, descent: float, landing: float) -> float:
+    """Climb rate (m/s, negative) of a landing at height ``up``."""
+    share = min(max((up - SLOW_BELOW_M) / (FAST_ABOVE_M - SLOW_BELOW_M), 0.0), 1.0)
+    return -(landing + share * (descent - landing))
+
+
+@kernel
+def move_one(body: Any, command: Any, limits: Any, dt: float) -> None:
+    """One vehicle, ``dt`` seconds further."""
+    c_east, c_north = command["east"], command["north"]
+    if command["aim"] == PLACE:
+        c_east -= body["east"]
+        c_north -= body["north"]
+        gap = math.sqrt(c_east * c_east + c_north * c_north)
+        speed = climb_rate_towards(0.0, gap, command["speed"], command["speed"], limits["acceleration"])
+        if gap > 0.0:
+            c_east *= speed / gap
+            c_north *= speed / gap
+    c_up = command["up"]
+    if command["lift"] == HEIGHT:
+        c_up = climb_rate_towards(
+            body["up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"]
+        )
+    elif command["lift"] == DESCENT:
+        c_up = landing_rate(body["up"], command["descent"], command["landing"])
+    if body["up"] <= 0.0 and c_up <= 0.0:
+        stand(body)
+        return
+    body["east"], body["north"], body["v_east"], body["v_north"] = horizontal(
+        body["east"], body["north"], body["v_east"], body["v_north"],
+        c_east, c_north, limits["speed"], limits["acceleration"], limits["lag"], dt,
+    )  # fmt: skip
+    body["up"], body["v_up"] = vertical(
+        body["up"], body["v_up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"], dt
+    )
+    if body["up"] <= 0.0:
+        stand(body)
+
+
+@kernel
+def stand(body: Any) -> None:
+    """On the ground, at rest."""
+    body["up"] = 0.0
+    body["v_east"] = 0.0
+    body["v_north"] = 0.0
+    body["v_up"] = 0.0
+
+
+@kernel
+def fall_one(body: Any, dt: float) -> None:
+    """Without power: stand, or fall."""
+    body["v_up"] -= GRAVITY * dt
+    body["up"] += body["v_up"] * dt
+    body["east"] += body["v_east"] * dt
+    body["north"] += body["v_north"] * dt
+    if body["up"] <= 0.0:
+        stand(body)
+
+
+@kernel
+def move(bodies: Records, commands: Records, limits: Records, steps: int, dt: float) -> None:
+    """All vehicles, ``steps`` times ``dt`` seconds further; the arrays have one row a vehicle."""
+    for k in range(bodies.shape[0]):
+        for _ in range(steps):
+            if commands[k]["powered"] == 1:
+                move_one(bodies[k], commands[k], limits[k], dt)
+            else:
+                fall_one(bodies[k], dt)
+
+
+@kernel
+def read_sensors(
+    bodies: Records, wire: NDArray[np.int64], origin_lat: float, origin_lon: float, origin_alt: float
+) -> None:
+    """Fill ``wire`` (V, 7): places in 1e-7 degrees, heights in mm, speeds north, east, down in cm/s."""
+    for k in range(bodies.shape[0]):
+        body = bodies[k]
+        lat, lon = to_geodetic(body["east"], body["north"], origin_lat, origin_lon, origin_alt)
+        wire[k, 0] = round(lat * 1e7)
+        wire[k, 1] = round(lon * 1e7)
+        wire[k, 2] = round((body["up"] + origin_alt) * 1000.0)
+        wire[k, 3] = round(body["up"] * 1000.0)
+        wire[k, 4] = round(body["v_north"] * 100.0)
+        wire[k, 5] = round(body["v_east"] * 100.0)
+        wire[k, 6] = round(-body["v_up"] * 100.0)

@@ -1,0 +1,347 @@
+"""PX4, as a multicopter of v1.17 was seen to behave on its onboard link.
+
+A mode is a row of `MODES`: its number on the wire, what it does when it is entered and as time passes.  The
+firmware remembers beside the mode it is in (which a failsafe may have chosen) the one to fall back to on
+the ground.  Commands are in px4_commands.py, setpoints and what they mean in px4_setpoints.py.
+"""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+from swarmctl.mavlink.codec import Frame
+from swarmctl.mavlink.dialect import mav
+
+from ..commands import Command
+from ..pilot import Limits
+from .projection import project
+from .px4_commands import ACCEPTED, COMMANDS, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
+from .px4_setpoints import Setpoints
+
+if TYPE_CHECKING:
+    from ..vehicle import StubVehicle
+
+READY_AFTER_S = 4.5
+SPOOL_UP_S = 2.0
+ALTITUDE_ACCEPTED_M = 0.8
+PLACE_ACCEPTED_M = 1.0
+AUTO_BASE_MODE: int = (
+    mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    | mav.MAV_MODE_FLAG_AUTO_ENABLED
+    | mav.MAV_MODE_FLAG_STABILIZE_ENABLED
+    | mav.MAV_MODE_FLAG_GUIDED_ENABLED
+)
+
+
+PASSING = frozenset({Mode.TAKEOFF, Mode.RTL, Mode.LAND})
+"""Modes that end by themselves: a vehicle on the ground falls back to the one before."""
+
+
+class Px4:
+    """One vehicle's PX4."""
+
+    autopilot: int = mav.MAV_AUTOPILOT_PX4
+    version = 0x011100FF  # 1.17.0, release
+    capabilities: int = mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    base_mode = AUTO_BASE_MODE
+
+    INTERVALS_US: ClassVar = {
+        mav.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
+        mav.MAVLINK_MSG_ID_SYS_STATUS: 200_000,
+        mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
+        mav.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
+        mav.MAVLINK_MSG_ID_HOME_POSITION: 1_000_000,
+        mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 20_000,
+        mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 33_333,
+        mav.MAVLINK_MSG_ID_ATTITUDE: 10_000,
+    }
+
+    @staticmethod
+    def parameters(limits: Limits) -> dict[str, float]:
+        """The parameters at boot; an int is an INT32 for good, a float a REAL32."""
+        return {
+            "COM_DISARM_LAND": 2.0,
+            "COM_DISARM_PRFLT": 10.0,
+            "COM_OF_LOSS_T": 1.0,
+            "GF_ACTION": 2,
+            "MIS_TAKEOFF_ALT": 2.5,
+            "MPC_ACC_HOR": limits.acceleration_mps2,
+            "MPC_LAND_SPEED": min(0.7, limits.descent_mps),
+            "MPC_TKO_SPEED": min(1.5, limits.climb_mps),
+            "MPC_XY_CRUISE": min(5.0, limits.speed_mps),
+            "MPC_XY_VEL_MAX": limits.speed_mps,
+            "MPC_Z_VEL_MAX_DN": limits.descent_mps,
+            "MPC_Z_VEL_MAX_UP": limits.climb_mps,
+            "RTL_CONE_ANG": 45,
+            "RTL_RETURN_ALT": 30.0,
+        }
+
+    def __init__(self, vehicle: "StubVehicle") -> None:
+        self.vehicle = vehicle
+        self._pilot = vehicle.pilot
+        self._parameters = vehicle.parameters
+        self._setpoints = Setpoints(vehicle)
+        self.mode = Mode.LOITER
+        self._resting_mode = Mode.LOITER
+        self._failsafe = False
+        self._step: Callable[[Px4], None] = MODES[self.mode].step
+        self._rtl_phase = 0
+        self.takeoff_height = 0.0
+        self._lift_off_at: float | None = None
+        self._return_height = 0.0
+        for name in ("MPC_XY_VEL_MAX", "MPC_ACC_HOR"):
+            self.parameter_changed(name)
+        self._pilot.limit("climb_acceleration", vehicle.limits.climb_acceleration_mps2)
+        self._pilot.limit("lag", vehicle.limits.lag_s)
+
+    # What telemetry tells
+
+    @property
+    def custom_mode(self) -> int:
+        """The mode's number."""
+        return int(self.mode)
+
+    @property
+    def system_status(self) -> int:
+        """Critical in a failsafe, else active while armed."""
+        if self._failsafe:
+            return int(mav.MAV_STATE_CRITICAL)
+        return int(mav.MAV_STATE_ACTIVE if self.vehicle.armed else mav.MAV_STATE_STANDBY)
+
+    @property
+    def landed_state(self) -> int:
+        """Landing and taking off are told by the mode, standing and flying by the body."""
+        if self.vehicle.landed:
+            return int(mav.MAV_LANDED_STATE_ON_GROUND)
+        if self.mode is Mode.TAKEOFF:
+            return int(mav.MAV_LANDED_STATE_TAKEOFF)
+        if self.mode is Mode.LAND or (self.mode is Mode.RTL and self._rtl_phase == len(RTL_PHASES) - 1):
+            return int(mav.MAV_LANDED_STATE_LANDING)
+        return int(mav.MAV_LANDED_STATE_IN_AIR)
+
+    @property
+    def ready(self) -> bool:
+        """Whether it could be armed: a while after boot, and in OFFBOARD only with a stream."""
+        return self.vehicle.since_boot >= READY_AFTER_S and (
+            self.mode is not Mode.OFFBOARD or self._setpoints.streaming
+        )
+
+    def local_ned(self) -> tuple[float, float, float]:
+        """North, east, down (m) from the vehicle's own origin, in PX4's projection."""
+        vehicle = self.vehicle
+        origin_lat, origin_lon, origin_alt = vehicle.local_origin
+        lat, lon, alt = vehicle.wire[:3]
+        north, east = project(lat * 1e-7, lon * 1e-7, origin_lat, origin_lon)
+        return north, east, origin_alt - alt * 1e-3
+
+    @property
+    def default_takeoff_height(self) -> float:
+        """Height (m) of a take-off from here whose altitude is not given."""
+        return self._pilot.place[2] + self._parameters["MIS_TAKEOFF_ALT"]
+
+    # Time
+
+    def step(self) -> None:
+        """Watch the disarm timers, then go on with the mode."""
+        vehicle = self.vehicle
+        if not vehicle.armed:
+            return
+        if vehicle.landed and self._disarm_is_due():
+            vehicle.say(
+                mav.MAV_SEVERITY_INFO, "Disarmed by " + ("landing" if vehicle.flown else "auto preflight")
+            )
+            vehicle.disarm()
+        else:
+            self._step(self)
+
+    def _disarm_is_due(self) -> bool:
+        """On the ground: a while after landing, or after arming without taking off."""
+        vehicle = self.vehicle
+        if vehicle.flown:
+            return vehicle.now - vehicle.landed_at >= self._parameters["COM_DISARM_LAND"]
+        return vehicle.now - vehicle.armed_at >= self._parameters["COM_DISARM_PRFLT"]
+
+    # Modes
+
+    def _enter(self, mode: Mode) -> None:
+        """Change the mode, and begin it if the motors run."""
+        self.mode = mode
+        self._step = MODES[mode].step
+        if mode not in PASSING:
+            self._resting_mode = mode
+        self._pace()
+        if self.vehicle.armed:
+            MODES[mode].begin(self)
+
+    def _pace(self) -> None:
+        """Tell the pilot how fast this mode may go."""
+        p = self._parameters
+        speed = p["MPC_XY_VEL_MAX" if self.mode is Mode.OFFBOARD else "MPC_XY_CRUISE"]
+        climb = p["MPC_TKO_SPEED" if self.mode is Mode.TAKEOFF else "MPC_Z_VEL_MAX_UP"]
+        self._pilot.pace(speed, climb, p["MPC_Z_VEL_MAX_DN"], p["MPC_LAND_SPEED"])
+
+    def _begin_loiter(self) -> None:
+        if self.vehicle.landed:
+            self._pilot.power(True)
+        else:
+            self._pilot.hold()
+
+    def _begin_takeoff(self) -> None:
+        vehicle = self.vehicle
+        vehicle.armed_at = vehicle.now
+        self._lift_off_at = vehicle.now + (SPOOL_UP_S if vehicle.landed else 0.0)
+
+    def _step_takeoff(self) -> None:
+        """Straight up once the motors are fast enough, then loiter there."""
+        if self._lift_off_at is None:
+            if abs(self._pilot.place[2] - self.takeoff_height) <= ALTITUDE_ACCEPTED_M:
+                self._enter(Mode.LOITER)
+                self._pilot.height(self.takeoff_height)
+        elif self.vehicle.now >= self._lift_off_at:
+            self._lift_off_at = None
+            self._pilot.hold()
+            self._pilot.height(self.takeoff_height)
+
+    def _begin_land(self) -> None:
+        self._pilot.hold()
+        self._pilot.descend()
+
+    def _begin_rtl(self) -> None:
+        self._rtl_phase = 0
+        RTL_PHASES[0].begin(self)
+
+    def _step_rtl(self) -> None:
+        if RTL_PHASES[self._rtl_phase].done(self):
+            self._rtl_phase += 1
+            RTL_PHASES[self._rtl_phase].begin(self)
+
+    def _climb_to_return(self) -> None:
+        """Climb to the return altitude, or lower when home is near: a cone stands on it."""
+        self._pilot.hold()
+        cone = math.radians(max(self._parameters["RTL_CONE_ANG"], 1))
+        allowed = min(self._home_distance() / math.tan(cone), self._parameters["RTL_RETURN_ALT"])
+        self._return_height = max(allowed, self._pilot.place[2])
+        self._pilot.height(self._return_height)
+
+    def _at_return_height(self) -> bool:
+        return self._pilot.place[2] >= self._return_height - ALTITUDE_ACCEPTED_M
+
+    def _fly_home(self) -> None:
+        self._pilot.go_to(*self.vehicle.home_place)
+
+    def _over_home(self) -> bool:
+        return self._home_distance() <= PLACE_ACCEPTED_M
+
+    def _never(self) -> bool:
+        return False
+
+    def _home_distance(self) -> float:
+        """Horizontal metres to home."""
+        east, north = self.vehicle.home_place
+        d_east, d_north = self._pilot.place[0] - east, self._pilot.place[1] - north
+        return math.sqrt(d_east * d_east + d_north * d_north)
+
+    def _begin_offboard(self) -> None:
+        self._setpoints.fly_last()
+
+    def _step_offboard(self) -> None:
+        if self._setpoints.lost:
+            self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Failsafe activated: no offboard signal, RTL")
+            self._enter(Mode.RTL)
+            self._failsafe = True
+
+    def _nothing(self) -> None:
+        """A mode in which time alone changes nothing."""
+
+    # Setpoints
+
+    def setpoint_local(self, frame: Frame) -> None:
+        """Follow it in OFFBOARD; a stream that comes back ends its failsafe."""
+        if self._setpoints.take_local(frame.fields):
+            self._follow()
+
+    def setpoint_global(self, frame: Frame) -> None:
+        """As `setpoint_local`."""
+        if self._setpoints.take_global(frame.fields):
+            self._follow()
+
+    def _follow(self) -> None:
+        if not self.vehicle.armed:
+            return
+        if self.mode is Mode.OFFBOARD:
+            self._setpoints.fly_last()
+        elif self._failsafe:
+            self._failsafe = False
+            self._enter(Mode.OFFBOARD)
+
+    # Commands
+
+    def command(self, command: Command) -> None:
+        """Obey and answer."""
+        handler = COMMANDS.get(command.number)
+        self.vehicle.answer(command, handler(self, command) if handler else UNSUPPORTED)
+
+    def order(self, mode: Mode) -> int:
+        """A mode asked for by a command: the result."""
+        if mode is not Mode.OFFBOARD and self.vehicle.home is None:
+            return TEMPORARILY_REJECTED
+        if mode is Mode.OFFBOARD and self.vehicle.armed and not self._setpoints.streaming:
+            self.vehicle.say(
+                mav.MAV_SEVERITY_CRITICAL, "Switching to mode 'Offboard' is currently not possible"
+            )
+            return TEMPORARILY_REJECTED
+        self._failsafe = False
+        self._enter(mode)
+        return ACCEPTED
+
+    def arm(self) -> int:
+        """Arm, if ready, and begin the mode that it is in: the result."""
+        if not self.ready:
+            self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Arming denied: Resolve system health failures first")
+            return TEMPORARILY_REJECTED
+        self.vehicle.arm()
+        self._enter(self.mode)
+        return ACCEPTED
+
+    # Called by the vehicle
+
+    def parameter_changed(self, name: str) -> None:
+        """Limits take effect at once."""
+        limit = {"MPC_XY_VEL_MAX": "speed", "MPC_ACC_HOR": "acceleration"}.get(name)
+        if limit is not None:
+            self._pilot.limit(limit, self._parameters[name])
+        self._pace()
+
+    def disarmed(self) -> None:
+        """Back to the mode before landing, which may be OFFBOARD."""
+        self._failsafe = False
+        self._enter(self._resting_mode)
+
+
+class ModeRow(NamedTuple):
+    """What a mode does when it begins, motors running, and at every tick."""
+
+    begin: Callable[[Px4], None]
+    step: Callable[[Px4], None]
+
+
+class Phase(NamedTuple):
+    """A part of the return: how it begins and when it is over."""
+
+    begin: Callable[[Px4], None]
+    done: Callable[[Px4], bool]
+
+
+MODES = {
+    Mode.LOITER: ModeRow(Px4._begin_loiter, Px4._nothing),
+    Mode.TAKEOFF: ModeRow(Px4._begin_takeoff, Px4._step_takeoff),
+    Mode.OFFBOARD: ModeRow(Px4._begin_offboard, Px4._step_offboard),
+    Mode.RTL: ModeRow(Px4._begin_rtl, Px4._step_rtl),
+    Mode.LAND: ModeRow(Px4._begin_land, Px4._nothing),
+}
+
+RTL_PHASES = (
+    Phase(Px4._climb_to_return, Px4._at_return_height),
+    Phase(Px4._fly_home, Px4._over_home),
+    Phase(Px4._begin_land, Px4._never),
+)

@@ -1,0 +1,298 @@
+"""The command line: parses, wires, prints; no logic.
+
+What a command needs is imported when it runs, so that ``swarmctl --help`` answers at once.  This is the only
+place that knows both the controller and the stub.
+"""
+
+import json
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from . import __version__
+from .core.planners import MODULES
+
+if TYPE_CHECKING:
+    from .core.world import World
+    from .flight.fly import Orders, Report
+    from .flight.lockstep import Vehicles
+    from .mission.model import Mission
+
+BAD_INPUT, DIFFERS, FAILED = 2, 5, 1
+PathArgument = click.Path(path_type=Path)
+
+
+def say(text: str) -> None:
+    """Progress and errors go to stderr; results alone to stdout."""
+    click.echo(text, err=True)
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Turn what bad input raises into a message and an exit code; nobody sees a traceback for it."""
+    from .flight.swarm import FlightError
+    from .mission.errors import MissionError
+    from .record.errors import RecordError
+
+    try:
+        yield
+    except (MissionError, RecordError) as error:
+        say(str(error))
+        sys.exit(BAD_INPUT)
+    except FlightError as error:
+        say(f"the flight failed: {error}")
+        sys.exit(FAILED)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__)
+def main() -> None:
+    """Search an area with a swarm of MAVLink vehicles, each with its own planner."""
+
+
+algorithm_option = click.option(
+    "--algo", "algorithm", type=click.Choice(list(MODULES)), help="Planner, in place of the mission's."
+)
+mission_option = click.option(
+    "--mission", "mission_file", type=PathArgument, help="Mission file (default: the packaged paper.yaml)."
+)
+
+
+@main.command()
+@mission_option
+@algorithm_option
+@click.option("--vehicles", type=click.IntRange(1), help="How many vehicles fly.")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**62), default=1, show_default=True, help="Targets, headings, planners."
+)
+@click.option("--duration", type=float, help="Length of the search in seconds.")
+@click.option("--speed", type=click.Choice(["max"]), default="max", help="max: lockstep, as fast as it goes.")
+@click.option("--out", type=PathArgument, help="The run's folder (default: runs/DATE-TIME-ALGO).")
+@click.option("--json", "as_json", is_flag=True, help="Print summary.json, and nothing else, on stdout.")
+@click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
+def fly(
+    mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
+    speed: str, out: Path | None, as_json: bool, yes: bool,
+) -> None:  # fmt: skip
+    """Fly a mission with stub vehicles in lockstep, over real MAVLink bytes, and record it."""
+    with plain_errors():
+        from .flight import fly as flight
+
+        mission = _load(mission_file, algorithm, vehicles, duration)
+        _refuse_what_stubs_cannot(mission)
+        name = mission.planner.algorithm
+        folder = flight.default_folder(out, name)
+        orders = flight.Orders()
+        with _interruptible(orders):
+            _warm_up(mission, name)
+            say(f"flying {len(mission.fleet)} stub vehicles with {name}, seed {seed}, into {folder.path}")
+            outcome = flight.fly(mission, seed, folder, _make_stubs, orders, _progress(mission))
+            summary = flight.write_results(outcome, folder)
+        if as_json:
+            click.echo(json.dumps(summary, indent=2, allow_nan=False))
+        else:
+            _print_summary(summary)
+        sys.exit(outcome.exit_code())
+
+
+@main.command()
+@click.argument("run", type=PathArgument)
+@algorithm_option
+@click.option("--stub", is_flag=True, help="Send the recorded setpoints to fresh stubs and compare tracks.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else, on stdout.")
+def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
+    """Recompute every recorded decision of RUN, plan and guard, and compare bit for bit."""
+    with plain_errors():
+        from .record import mcap_read
+        from .record.folder import RunFolder
+
+        folder = RunFolder.open(run)
+        if stub:
+            _replay_stub(folder, as_json)
+            return
+        from .record.replay import replay as recompute
+
+        say("recomputing the recorded decisions (the first time kernels are compiled)")
+        result = recompute(mcap_read.read(folder.mcap), algorithm)
+        if as_json:
+            click.echo(json.dumps(result.as_json(), indent=2, allow_nan=False))
+        else:
+            click.echo(result.as_text())
+        sys.exit(0 if result.same else DIFFERS)
+
+
+@main.command()
+@mission_option
+def check(mission_file: Path | None) -> None:
+    """Validate a mission and say what it is; arm nothing."""
+    with plain_errors():
+        mission = _load(mission_file, None, None, None)
+        from .mission.scenario import Scenario
+
+        scenario = Scenario(mission, ideal=False)
+        targets = len(scenario.scene(1).targets)
+        click.echo(
+            f"{mission.name}: valid. {len(mission.fleet)} vehicles, {mission.planner.algorithm}, "
+            f"{scenario.regions.legal.area / 1e6:.3f} km² to search inside the margin, "
+            f"{len(mission.keep_out)} keep-outs, {targets} targets, {mission.duration_s:g} s"
+        )
+
+
+@main.command()
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def algos(as_json: bool) -> None:
+    """What can be flown, with its parameters, their defaults and where they come from."""
+    from .core import planners
+
+    table = {name: planners.module(name) for name in MODULES}
+    if as_json:
+        rows = {
+            name: {"title": m.TITLE, "parameters": [p._asdict() for p in m.PARAMETERS]}
+            for name, m in table.items()
+        }
+        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
+        return
+    for name, module in table.items():
+        click.echo(f"{name}: {module.TITLE}")
+        for p in module.PARAMETERS:
+            click.echo(f"    {p.name:<18}{p.default:>8g}  {p.meaning}  [{p.source}]")
+
+
+@main.command()
+@click.argument("run", type=PathArgument)
+def report(run: Path) -> None:
+    """Draw tracks.png of RUN anew, from its recording."""
+    with plain_errors():
+        from .record.folder import RunFolder
+        from .record.redraw import redraw
+
+        click.echo(str(redraw(RunFolder.open(run))))
+
+
+def _load(
+    mission_file: Path | None, algorithm: str | None, vehicles: int | None, duration: float | None
+) -> "Mission":
+    from .mission.load import load
+
+    given = {"planner.algorithm": algorithm, "vehicles.count": vehicles, "duration_s": duration}
+    return load(mission_file, {key: value for key, value in given.items() if value is not None})
+
+
+def _refuse_what_stubs_cannot(mission: "Mission") -> None:
+    """Say plainly what a stub does not simulate yet, or a flight never does."""
+    complaints = []
+    if mission.dynamics == "ideal":
+        complaints.append(
+            "dynamics: fly flies multicopters, not ideal points (leave the key out, or study it)"
+        )
+    if any(mission.stub.wind_mps):
+        complaints.append("stub.wind_mps: the stub has no wind yet (set it to [0, 0])")
+    if mission.stub.autopilot != "px4" or any(v.autopilot == "ardupilot" for v in mission.fleet):
+        complaints.append("stub.autopilot: the stub plays px4 so far (set it to px4)")
+    if any(v.connect for v in mission.fleet):
+        complaints.append("vehicles.connect: real vehicles cannot be flown yet (leave the key out)")
+    if complaints:
+        say("\n".join(complaints))
+        sys.exit(BAD_INPUT)
+
+
+def _warm_up(mission: "Mission", name: str) -> None:
+    from .core import bind
+    from .flight.fly import warm_up
+
+    if not bind.is_compiled(name):
+        say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
+    warm_up(mission, name)
+
+
+def _make_stubs(mission: "Mission", world: "World") -> "Vehicles":
+    """Stub vehicles that fly as the mission says, standing on its pads."""
+    from sim_vehicle_stub.configured import configured_fleet
+
+    endurance = [v.endurance_s or 2.0 * mission.duration_s for v in mission.fleet]
+    origin = (mission.origin.lat, mission.origin.lon, mission.origin.alt_m)
+    return configured_fleet(world.fleet, origin, endurance, 1.0 / mission.setpoints.rate_hz)
+
+
+@contextmanager
+def _interruptible(orders: "Orders") -> Iterator[None]:
+    """Ctrl-C (or SIGTERM) once: all return; twice: all land; a third time: stop at once."""
+
+    def obey(number: int, frame: FrameType | None) -> None:
+        orders.interrupt()
+        if orders.level > 2:
+            raise KeyboardInterrupt
+        say("landing now" if orders.level == 2 else "returning; press Ctrl-C again to land now")
+
+    before: dict[int, Any] = {n: signal.signal(n, obey) for n in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _progress(mission: "Mission") -> "Report":
+    """A line for each part of the flight; on a terminal, one that moves."""
+    from .flight.swarm import Swarm
+
+    shown: list[str] = [""]
+    moving = sys.stderr.isatty()
+
+    def report(now: float, swarm: Swarm, world: "World") -> None:
+        share = float((world.found >= 0).mean()) if len(world.found) else 0.0
+        line = f"{now:7.0f} s  {swarm.part.value:<12} found {100 * share:5.1f} %"
+        if moving:
+            click.echo(f"\r{line}", err=True, nl=False)
+            if swarm.part.value == "over":
+                say("")
+        elif swarm.part.value != shown[0]:
+            say(line)
+        shown[0] = swarm.part.value
+
+    return report
+
+
+def _print_summary(summary: dict[str, Any]) -> None:
+    """The figures a person looks for first."""
+    reached = ", ".join(
+        f"{k} % at {v:.0f} s" if v is not None else f"{k} % never" for k, v in summary["time_to_s"].items()
+    )
+    close = summary["min_separation_m"]
+    landed = sum(v["outcome"] == "landed" for v in summary["per_vehicle"])
+    lines = (
+        f"{summary['algorithm']}: {summary['detected']} of {summary['targets']} targets found; {reached}",
+        f"{landed} of {summary['vehicles']} vehicles landed; closest approach "
+        + ("none" if close is None else f"{close:.1f} m")
+        + f"; {summary['geofence_violations']} fence violations",
+        f"{summary['wall_s']:.1f} s of wall time, {summary['real_time_factor']:.0f} x real time",
+        f"run: {summary['run']}",
+    )
+    click.echo("\n".join(lines))
+    for vehicle in summary["per_vehicle"]:
+        for event in vehicle["events"]:
+            click.echo(f"  vehicle {vehicle['id']}: {event}")
+
+
+def _replay_stub(folder: Any, as_json: bool) -> None:
+    from sim_vehicle_stub.configured import configured_fleet
+
+    from .record.stub_replay import replay_stub
+
+    result = replay_stub(folder, configured_fleet)
+    if as_json:
+        click.echo(json.dumps(result.as_json(), indent=2, allow_nan=False))
+    else:
+        click.echo(result.as_text())
+    sys.exit(0 if result.same else DIFFERS)
+
+
+Command = Callable[..., None]
+if __name__ == "__main__":
+    main()

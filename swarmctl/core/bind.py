@@ -1,0 +1,108 @@
+"""Binding: the loop's entry points, compiled once for each planner, and cached without going stale.
+
+Each entry's code object is rebound with the planner's kernels as globals, callees first, and only these bound
+functions are cached by Numba.  The cache folder is named by a digest of every source of this package, of the
+versions of Python, NumPy and Numba, and of the NUMBA_* settings that change code: an edited kernel never
+meets an old cache.  With no writable user cache a temporary folder is used.  This is the only module of the
+core that touches files.
+"""
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import FunctionType, SimpleNamespace
+from typing import Any
+
+import numba
+import numpy as np
+
+from . import loop, planners, scene, steering, wire
+
+BOUND = ("prepare", "observe", "share", "deliver", "decide", "period", "run_ideal", "run_multicopter")
+PLAIN = {
+    steering: ("begin_return", "steer"),
+    wire: ("read_poses",),
+    scene: ("place_centres", "lay_out", "sort_into"),
+}
+_NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
+
+
+def digest() -> str:
+    """A name for the code that the kernels compile to: sources, versions and compiler settings."""
+    sha = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        sha.update(source.name.encode() + b"\0" + source.read_bytes())
+    flags = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k not in _NOT_CODE}
+    sha.update(repr((sys.version, np.__version__, numba.__version__, sorted(flags.items()))).encode())
+    return sha.hexdigest()[:20]
+
+
+def cache_folder() -> Path:
+    """The writable folder that holds the compiled kernels of exactly this code."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    folder = Path(home) / "swarmctl" / "kernels" / digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="swarmctl-kernels-"))
+    return folder
+
+
+def _compile(function: Callable[..., Any], name: str, free: dict[str, Any]) -> Any:
+    bound = FunctionType(function.__code__, {**function.__globals__, **free}, name)
+    bound.__qualname__ = name  # Numba's cache index goes by it
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(bound)
+
+
+@cache
+def _use_cache() -> Path:
+    folder = cache_folder()
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    return folder
+
+
+def is_compiled(name: str) -> bool:
+    """Whether kernels for algorithm ``name`` are in the cache already (a first start has to compile)."""
+    return any(_use_cache().rglob(f"*decide_{name.replace('-', '_')}-*.nbi"))
+
+
+@cache
+def bind(name: str) -> SimpleNamespace:
+    """The loop's entry points for algorithm ``name``, and its memory's dtype; KeyError for an unknown one.
+
+    They compile at their first call with given array types, or load from the cache.
+    """
+    _use_cache()
+    module = planners.module(name)
+    free: dict[str, Any] = {"start": module.start, "tell": module.tell, "plan": module.step}
+    for entry in BOUND:
+        free[entry] = _compile(getattr(loop, entry), f"{entry}_{name.replace('-', '_')}", free)
+    free.update(plain())
+    return SimpleNamespace(memory_dtype=module.MEMORY, **free)
+
+
+@cache
+def plain() -> dict[str, Any]:
+    """The entry points that are the same for every planner."""
+    _use_cache()
+    free: dict[str, Any] = {}
+    for module, entries in PLAIN.items():
+        for entry in entries:
+            free[entry] = compiled(getattr(module, entry))
+    return free
+
+
+def compiled(kernel: Callable[..., Any]) -> Any:
+    """The cached entry point for one kernel, this package's or another's.
+
+    A kernel from outside this package may only call this package and its own file, whose time stamp Numba's
+    cache goes by.
+    """
+    _use_cache()
+    return _compile(getattr(kernel, "py_func", kernel), kernel.__name__, {})

@@ -1,0 +1,217 @@
+"""Guard: the last word on every setpoint.
+
+Every airborne vehicle owns a *stop path*: from where it is, on for its latency, then braking to standstill.
+It lies inside the fence and at least the separation from every other vehicle's stop path at its height.  A
+velocity is accepted only if the stop path after one more setpoint interval keeps this; otherwise it is turned
+or slowed until it does; otherwise the vehicle brakes, along the path it already owns.  Vehicles are taken in a
+fixed order, each against the paths the others own by then, so the invariant passes from tick to tick.
+
+What the planner says does not matter for safety: not-a-number and infinity mean "stand still".
+"""
+
+import math
+
+from . import fence, motion
+from .arrays import Floats, Records
+from .jit import kernel
+
+HEIGHT_SEPARATION_M = 5.0  # vehicles nearer than this in height must be separated horizontally
+HEIGHT_MARGIN_M = 0.7  # two vehicles' height errors together
+SEPARATION_MARGIN_M = 0.5  # rounding of positions and velocities on the wire, curvature of a turn
+BRAKING_SHARE = 0.9  # of the vehicle's braking is counted on
+RECOVERY_MPS = 3.0  # back towards the fence from outside
+
+KEPT, TURNED, BRAKED, RECOVERING, UNGUARDED = 0, 1, 2, 3, 4
+OUTCOMES = ("kept", "turned", "braked", "recovering", "unguarded")
+
+# The turns tried, in degrees, nearest to the wish first; right before left, so that two that meet pass.
+TURNS = (0.0, -20.0, 20.0, -40.0, 40.0, -65.0, 65.0, -90.0, 90.0, -120.0, 120.0, 180.0)
+SPEEDS = (1.0, 0.5, 0.2)
+COSINES = tuple(math.cos(math.radians(a)) for a in TURNS)
+SINES = tuple(math.sin(math.radians(a)) for a in TURNS)
+
+
+@kernel
+def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
+    """Where vehicle ``i``, braking from velocity (vx, vy) at (x, y), stands still."""
+    speed = math.sqrt(vx * vx + vy * vy)
+    if speed < 1e-9:
+        return x, y
+    braking = BRAKING_SHARE * fleet[i].braking
+    lag = fleet[i].lag
+    distance = speed * speed / (2.0 * braking) + min(speed, braking * lag) * lag
+    return x + distance * vx / speed, y + distance * vy / speed
+
+
+@kernel
+def _coast(
+    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, interval: float
+) -> tuple[float, float, float, float]:
+    """Position and velocity after the latency under the last setpoint and ``interval`` s under (cx, cy)."""
+    x, y, vx, vy = poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north
+    speed, acceleration, lag = fleet[i].speed, fleet[i].acceleration, fleet[i].lag
+    if fleet[i].latency > 0.0:
+        x, y, vx, vy = motion.horizontal(
+            x, y, vx, vy, setpoints[i].v_east, setpoints[i].v_north, speed, acceleration, lag,
+            fleet[i].latency,
+        )  # fmt: skip
+    if interval > 0.0:
+        x, y, vx, vy = motion.horizontal(x, y, vx, vy, cx, cy, speed, acceleration, lag, interval)
+    return x, y, vx, vy
+
+
+@kernel
+def _write_path(
+    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, interval: float,
+    paths: Records, row: int,
+) -> None:  # fmt: skip
+    """Write into ``paths[row]`` the path vehicle ``i`` will own after ``interval`` s of command (cx, cy)."""
+    x, y, vx, vy = _coast(fleet, i, poses, setpoints, cx, cy, interval)
+    end_x, end_y = _stop(fleet, i, x, y, vx, vy)
+    east, north = poses[i].east, poses[i].north
+    paths[row].east_0, paths[row].north_0 = east, north
+    paths[row].east_1, paths[row].north_1 = x, y
+    paths[row].east_2, paths[row].north_2 = end_x, end_y
+    paths[row].reach = math.sqrt((x - east) * (x - east) + (y - north) * (y - north)) + math.sqrt(
+        (end_x - x) * (end_x - x) + (end_y - y) * (end_y - y)
+    )
+
+
+@kernel
+def own_path(
+    fleet: Records, i: int, poses: Records, setpoints: Records, wanted_up: float, airborne: bool,
+    paths: Records,
+) -> None:  # fmt: skip
+    """Write the stop path that vehicle ``i`` owns as it is now, braking at once."""
+    _write_path(fleet, i, poses, setpoints, 0.0, 0.0, 0.0, paths, i)
+    paths[i].low = min(poses[i].up, wanted_up)
+    paths[i].high = max(poses[i].up, wanted_up)
+    paths[i].airborne = 1 if airborne else 0
+
+
+@kernel
+def path_distance(paths: Records, a: int, b: int) -> float:
+    """Squared horizontal distance (m²) between two stop paths."""
+    closest = math.inf
+    for first in range(2):
+        if first == 0:
+            ax, ay, bx, by = paths[a].east_0, paths[a].north_0, paths[a].east_1, paths[a].north_1
+        else:
+            ax, ay, bx, by = paths[a].east_1, paths[a].north_1, paths[a].east_2, paths[a].north_2
+        closest = min(
+            closest,
+            fence.segment_to_segment(
+                ax, ay, bx, by, paths[b].east_0, paths[b].north_0, paths[b].east_1, paths[b].north_1
+            ),
+            fence.segment_to_segment(
+                ax, ay, bx, by, paths[b].east_1, paths[b].north_1, paths[b].east_2, paths[b].north_2
+            ),
+        )
+    return closest
+
+
+@kernel
+def same_height(paths: Records, a: int, b: int) -> bool:
+    """Whether two paths' heights come so near that horizontal separation is needed."""
+    gap = max(paths[a].low - paths[b].high, paths[b].low - paths[a].high)
+    return bool(gap < HEIGHT_SEPARATION_M + HEIGHT_MARGIN_M)
+
+
+@kernel
+def _apart(paths: Records, i: int, row: int, separation: float) -> bool:
+    """Whether candidate ``paths[row]`` of vehicle ``i`` keeps clear of every other vehicle's path.
+
+    Where the path vehicle ``i`` owns is already nearer than that (two that were launched so), it may not come
+    nearer still.
+    """
+    wanted = separation + SEPARATION_MARGIN_M
+    for j in range(paths.shape[0] - 1):
+        if j == i or paths[j].airborne == 0 or not same_height(paths, i, j):
+            continue
+        dx = paths[j].east_0 - paths[row].east_0
+        dy = paths[j].north_0 - paths[row].north_0
+        room = wanted + paths[row].reach + paths[j].reach
+        if dx * dx + dy * dy > room * room:
+            continue
+        distance = path_distance(paths, row, j)
+        if distance < wanted * wanted and distance < path_distance(paths, i, j) * (1.0 - 1e-9):
+            return False
+    return True
+
+
+@kernel
+def _within(paths: Records, row: int, edges: Floats) -> bool:
+    """Whether a path that begins inside the fence stays there."""
+    return not (
+        fence.crosses(edges, paths[row].east_0, paths[row].north_0, paths[row].east_1, paths[row].north_1)
+        or fence.crosses(edges, paths[row].east_1, paths[row].north_1, paths[row].east_2, paths[row].north_2)
+    )
+
+
+@kernel
+def _accept(
+    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, rules: Records,
+    edges: Floats, paths: Records, fenced: bool,
+) -> bool:  # fmt: skip
+    """Whether vehicle ``i`` may be told (cx, cy); if so it owns the new path, and the setpoint is written."""
+    row = paths.shape[0] - 1
+    _write_path(fleet, i, poses, setpoints, cx, cy, rules[0].interval, paths, row)
+    if fenced and not _within(paths, row, edges):
+        return False
+    if not _apart(paths, i, row, rules[0].separation):
+        return False
+    paths[i].east_1, paths[i].north_1 = paths[row].east_1, paths[row].north_1
+    paths[i].east_2, paths[i].north_2 = paths[row].east_2, paths[row].north_2
+    paths[i].reach = paths[row].reach
+    setpoints[i].v_east, setpoints[i].v_north = cx, cy
+    return True
+
+
+@kernel
+def _brake(setpoints: Records, i: int) -> None:
+    setpoints[i].v_east = 0.0
+    setpoints[i].v_north = 0.0
+    setpoints[i].outcome = BRAKED
+
+
+@kernel
+def _recover(
+    fleet: Records, i: int, poses: Records, setpoints: Records, rules: Records, edges: Floats, paths: Records
+) -> None:
+    """Outside the fence (wind, a pilot): slowly back by the shortest way, if others leave room."""
+    x, y = fence.nearest(edges, poses[i].east, poses[i].north)
+    dx, dy = x - poses[i].east, y - poses[i].north
+    size = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+    speed = min(RECOVERY_MPS, fleet[i].speed)
+    if _accept(fleet, i, poses, setpoints, speed * dx / size, speed * dy / size, rules, edges, paths, False):
+        setpoints[i].outcome = RECOVERING
+    else:
+        _brake(setpoints, i)
+
+
+@kernel
+def guard(
+    fleet: Records, i: int, poses: Records, wish_x: float, wish_y: float, rules: Records, edges: Floats,
+    paths: Records, setpoints: Records,
+) -> None:  # fmt: skip
+    """Write vehicle ``i``'s setpoint: the wish (m/s), or the nearest velocity to it that keeps the invariant.
+
+    ``paths`` (V + 1,) holds every vehicle's stop path, and a row for the candidate.
+    """
+    if not (math.isfinite(wish_x) and math.isfinite(wish_y)):
+        wish_x, wish_y = 0.0, 0.0
+    size = math.sqrt(wish_x * wish_x + wish_y * wish_y)
+    if size > fleet[i].speed:
+        wish_x *= fleet[i].speed / size
+        wish_y *= fleet[i].speed / size
+    if not fence.inside(edges, poses[i].east, poses[i].north):
+        _recover(fleet, i, poses, setpoints, rules, edges, paths)
+        return
+    for s in range(len(SPEEDS)):
+        for k in range(len(COSINES)):
+            cx = SPEEDS[s] * (COSINES[k] * wish_x - SINES[k] * wish_y)
+            cy = SPEEDS[s] * (SINES[k] * wish_x + COSINES[k] * wish_y)
+            if _accept(fleet, i, poses, setpoints, cx, cy, rules, edges, paths, True):
+                setpoints[i].outcome = KEPT if s == 0 and k == 0 else TURNED
+                return
+    _brake(setpoints, i)

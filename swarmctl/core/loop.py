@@ -1,0 +1,167 @@
+"""The loop: sense → know ⇄ radio → plan, once a planner period, for every vehicle.
+
+Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell`` and
+``plan``.  A flight calls the four stages one by one, so that its recorder sees what passes between them and a
+replay can put recorded reports and deliveries in their place; a study calls ``period`` and ``run_ideal``.
+Arrays have one row a vehicle:
+
+    fleet VEHICLE, poses POSE, knowledge KNOWLEDGE, memory the planner's MEMORY, wishes WISH
+    contacts (V, C) CONTACT          what each vehicle knows, in the order it learned it
+    has (V, C) uint8, told (V, V)    the same as a set; how much of whose list was heard
+    reports (V, R) CONTACT, report_count (V,)             this period's sensor reports
+    beacons (D, V) BEACON, heard (D, V, K), heard_count (D, V)    a ring of D periods' beacons and hearers
+"""
+
+from typing import TYPE_CHECKING
+
+from . import know, radio, sense, stages, steering
+from .arrays import Flags, Floats, Integers, Records
+
+if TYPE_CHECKING:
+    from .planners.bounce import start, tell
+    from .planners.bounce import step as plan
+
+
+def prepare(memory: Records, fleet: Records, rules: Records, edges: Floats) -> None:
+    """Give every planner its initial heading and whatever it prepares at launch."""
+    for i in range(fleet.shape[0]):
+        memory[i].heading_east = fleet[i].heading_east
+        memory[i].heading_north = fleet[i].heading_north
+        memory[i].throttle = 1.0
+        start(memory, i, fleet, rules, edges)
+
+
+def observe(
+    fleet: Records, poses: Records, targets: Records, grid: Records, starts: Integers, alarms: Integers,
+    rules: Records, tick: int, reports: Records, report_count: Integers, found: Integers,
+) -> None:  # fmt: skip
+    """Sense: the emulated sensors' reports at ``tick``."""
+    for i in range(fleet.shape[0]):
+        report_count[i] = sense.sense(
+            fleet, i, poses, targets, grid, starts, alarms, rules, tick, reports, found
+        )
+
+
+def share(
+    memory: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags, reports: Records,
+    report_count: Integers, beacons: Records, slot: int, rules: Records,
+) -> None:  # fmt: skip
+    """Know, first half: learn what the own sensor reported, and make the beacon."""
+    for i in range(poses.shape[0]):
+        know.learn_seen(knowledge, i, contacts, has, reports, report_count[i])
+        know.announce(beacons, slot, i, poses, knowledge, rules[0].beacon_contacts)
+        tell(memory, i, beacons, slot)
+
+
+def deliver(
+    fleet: Records, poses: Records, rules: Records, tick: int, slot: int, heard: Integers,
+    heard_count: Integers,
+) -> None:  # fmt: skip
+    """Radio: who will hear the beacons sent at ``tick``."""
+    for i in range(poses.shape[0]):
+        radio.deliver(fleet, i, poses, rules, tick, slot, heard, heard_count)
+
+
+def decide(
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    told: Integers, beacons: Records, heard: Integers, heard_count: Integers, slot: int, edges: Floats,
+    rules: Records, settings: Records, tick: int, wishes: Records,
+) -> None:  # fmt: skip
+    """Know, second half, and plan: learn what was heard, then let each planner turn its heading.
+
+    ``slot`` is that of the beacons which arrive now, sent ``rules.radio_delay`` periods ago.
+    """
+    for i in range(poses.shape[0]):
+        know.learn_told(knowledge, i, contacts, has, beacons, heard, heard_count[slot, i], slot, told)
+        plan(
+            memory, i, fleet, poses, knowledge, contacts, beacons, heard, heard_count, slot, edges, rules,
+            settings, tick,
+        )  # fmt: skip
+        speed = fleet[i].speed * memory[i].throttle
+        wishes[i].v_east = speed * memory[i].heading_east
+        wishes[i].v_north = speed * memory[i].heading_north
+
+
+def period(
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
+    report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
+    edges: Floats, rules: Records, settings: Records, tick: int, wishes: Records,
+) -> None:  # fmt: skip
+    """All four stages of one period."""
+    depth = beacons.shape[0]
+    slot = tick % depth
+    arriving = (tick + depth - rules[0].radio_delay) % depth
+    observe(fleet, poses, targets, grid, starts, alarms, rules, tick, reports, report_count, found)
+    share(memory, poses, knowledge, contacts, has, reports, report_count, beacons, slot, rules)
+    deliver(fleet, poses, rules, tick, slot, heard, heard_count)
+    decide(
+        memory, fleet, poses, knowledge, contacts, has, told, beacons, heard, heard_count, arriving, edges,
+        rules, settings, tick, wishes,
+    )  # fmt: skip
+
+
+def run_ideal(
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
+    report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
+    edges: Floats, rules: Records, settings: Records, wishes: Records, in_range: Integers,
+) -> None:  # fmt: skip
+    """A whole search in ideal dynamics, x += v dt (eq. 2); ``in_range`` (ticks, V) counts targets in range."""
+    prepare(memory, fleet, rules, edges)
+    for tick in range(in_range.shape[0]):
+        period(
+            memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
+            report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
+        )  # fmt: skip
+        for i in range(poses.shape[0]):
+            in_range[tick, i] = knowledge[i].in_range
+            poses[i].v_east = wishes[i].v_east
+            poses[i].v_north = wishes[i].v_north
+            poses[i].east += wishes[i].v_east * rules[0].period
+            poses[i].north += wishes[i].v_north * rules[0].period
+
+
+def run_multicopter(
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
+    report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
+    edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records, settings: Records,
+    wishes: Records, errands: Records, paths: Records, wants: Records, setpoints: Records,
+    orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
+) -> int:  # fmt: skip
+    """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
+
+    Returns the number of setpoint ticks; ``most_ticks`` means that not everybody landed.
+    """
+    prepare(memory, fleet, rules, edges)
+    per_period = round(rules[0].period / rules[0].interval)
+    begun = -1
+    for i in range(errands.shape[0]):
+        errands[i].stage = stages.TAKE_OFF
+    for k in range(most_ticks):
+        if begun < 0 and steering.release(errands):
+            begun = k
+        ahead = k - begun
+        if begun >= 0 and ahead % per_period == 0 and ahead // per_period < in_range.shape[0]:
+            tick = ahead // per_period
+            period(
+                memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
+                report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
+            )  # fmt: skip
+            for i in range(poses.shape[0]):
+                in_range[tick, i] = knowledge[i].in_range
+        if begun >= 0 and ahead == in_range.shape[0] * per_period:
+            orders[:] = 1
+            steering.begin_return(
+                fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges
+            )
+        steering.steer(
+            fleet, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, paths, wants,
+            setpoints,
+        )  # fmt: skip
+        steering.move(fleet, poses, errands, setpoints, rules)
+        steering.watch(poses, errands, raw_edges, account)
+        if steering.all_landed(errands):
+            return k
+    return most_ticks

@@ -1,0 +1,28 @@
+"""The planners: one module an algorithm, and the registry of their names.
+
+A planner module has TITLE, PARAMETERS, MEMORY (a dtype that begins with the common fields) and three kernels:
+``start`` prepares a memory, ``tell`` fills the planner's part of the beacon, ``step`` plans one period.
+"""
+
+from importlib import import_module
+from types import ModuleType
+
+MODULES = {
+    "mdc": "mdc",
+    "fco": "fco",
+    "ace": "ace",
+    "dpso-u": "dpso_u",
+    "bounce": "bounce",
+    "levy": "levy",
+    "sweep": "sweep",
+}
+
+
+def module(name: str) -> ModuleType:
+    """The module of algorithm ``name``; KeyError for an unknown one."""
+    return import_module(f"{__name__}.{MODULES[name]}")
+
+
+def catalogue() -> dict[str, dict[str, float | str]]:
+    """Every algorithm with its parameters' defaults."""
+    return {name: {p.name: p.default for p in module(name).PARAMETERS} for name in MODULES}

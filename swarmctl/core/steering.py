@@ -1,0 +1,127 @@
+"""The setpoint loop, several times a planner period: homing → guard → setpoint, the same for every planner."""
+
+import math
+
+from . import fence, guard, homing, motion, stages
+from .arrays import Floats, Integers, Records
+from .jit import kernel
+
+
+@kernel
+def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> float:
+    """The height a vehicle is on its way to."""
+    stage = errands[i].stage
+    if stage == stages.WAIT:
+        return float(poses[i].up)
+    if stage < stages.WAIT:
+        return float(fleet[i].altitude)
+    return 0.0 if stage >= stages.DESCEND else float(errands[i].layer)
+
+
+@kernel
+def begin_return(
+    fleet: Records, poses: Records, errands: Records, orders: Integers, now: float, rules: Records,
+    plan_edges: Floats, guard_edges: Floats,
+) -> None:  # fmt: skip
+    """Send home every vehicle with a one in ``orders`` (V,)."""
+    for i in range(orders.shape[0]):
+        if orders[i] != 0:
+            homing.order_home(fleet, poses, errands, i, now, rules, plan_edges, guard_edges)
+
+
+@kernel
+def steer(
+    fleet: Records, poses: Records, errands: Records, wishes: Records, now: float, rules: Records,
+    plan_edges: Floats, guard_edges: Floats, paths: Records, wants: Records, setpoints: Records,
+) -> None:  # fmt: skip
+    """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
+    for i in range(fleet.shape[0]):
+        airborne = stages.TAKE_OFF <= errands[i].stage <= stages.LAND
+        guard.own_path(fleet, i, poses, setpoints, _wanted_up(fleet, errands, poses, i), airborne, paths)
+    for i in range(fleet.shape[0]):
+        stage = errands[i].stage
+        wants[i].v_east, wants[i].v_north, wants[i].up = 0.0, 0.0, fleet[i].altitude
+        if stage == stages.SEARCH:
+            wants[i].v_east, wants[i].v_north = wishes[i].v_east, wishes[i].v_north
+        elif stages.WAIT <= stage <= stages.LAND:
+            homing.home(fleet, poses, errands, i, now, rules, plan_edges, guard_edges, paths, wants)
+        setpoints[i].up = wants[i].up
+        if stages.SEARCH <= stage <= stages.LAND:
+            guard.guard(
+                fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, setpoints
+            )
+        else:
+            setpoints[i].v_east, setpoints[i].v_north = 0.0, 0.0
+            setpoints[i].outcome = guard.UNGUARDED
+
+
+@kernel
+def _climb(
+    fleet: Records, poses: Records, errands: Records, setpoints: Records, rules: Records, i: int
+) -> None:
+    descent = rules[0].landing_speed if errands[i].stage == stages.LAND else fleet[i].descent
+    agility = fleet[i].climb_acceleration
+    rate = motion.climb_rate_towards(poses[i].up, setpoints[i].up, fleet[i].climb, descent, agility)
+    up, v_up = motion.vertical(
+        poses[i].up, poses[i].v_up, rate, fleet[i].climb, fleet[i].descent, agility, rules[0].interval
+    )
+    poses[i].up, poses[i].v_up = (up, v_up) if up > 0.0 else (0.0, 0.0)
+
+
+@kernel
+def move(fleet: Records, poses: Records, errands: Records, setpoints: Records, rules: Records) -> None:
+    """Let every airborne vehicle of a study follow its setpoint for one interval."""
+    for i in range(fleet.shape[0]):
+        if errands[i].stage < stages.TAKE_OFF or errands[i].stage > stages.LAND:
+            continue
+        east, north, v_east, v_north = motion.horizontal(
+            poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north, setpoints[i].v_east,
+            setpoints[i].v_north, fleet[i].speed, fleet[i].acceleration, fleet[i].lag, rules[0].interval,
+        )  # fmt: skip
+        poses[i].east, poses[i].north = east, north
+        poses[i].v_east, poses[i].v_north = v_east, v_north
+        _climb(fleet, poses, errands, setpoints, rules, i)
+        if errands[i].stage == stages.TAKE_OFF and abs(poses[i].up - fleet[i].altitude) < 0.5:
+            errands[i].stage = stages.HOLD
+        elif errands[i].stage == stages.LAND and poses[i].up < 0.05:
+            errands[i].stage = stages.LANDED
+
+
+@kernel
+def release(errands: Records) -> bool:
+    """The barrier: when every vehicle holds, all begin to search; returns whether they do."""
+    for i in range(errands.shape[0]):
+        if errands[i].stage != stages.HOLD:
+            return False
+    for i in range(errands.shape[0]):
+        errands[i].stage = stages.SEARCH
+    return True
+
+
+@kernel
+def all_landed(errands: Records) -> bool:
+    """Whether every vehicle's flight is over."""
+    for i in range(errands.shape[0]):
+        if errands[i].stage != stages.LANDED:
+            return False
+    return True
+
+
+@kernel
+def watch(poses: Records, errands: Records, raw_edges: Floats, account: Floats) -> None:
+    """Add this tick to ``account``: nearest approach (m), vehicle-ticks outside, standing, searching."""
+    for i in range(poses.shape[0]):
+        if not stages.TAKE_OFF <= errands[i].stage <= stages.LAND:
+            continue
+        if not fence.inside(raw_edges, poses[i].east, poses[i].north):
+            account[1] += 1.0
+        if errands[i].stage == stages.SEARCH:
+            speed = math.sqrt(poses[i].v_east * poses[i].v_east + poses[i].v_north * poses[i].v_north)
+            account[2] += 1.0 if speed < 0.5 else 0.0
+            account[3] += 1.0
+        for j in range(i):
+            if not stages.TAKE_OFF <= errands[j].stage <= stages.LAND:
+                continue
+            if abs(poses[i].up - poses[j].up) < guard.HEIGHT_SEPARATION_M:
+                dx, dy = poses[i].east - poses[j].east, poses[i].north - poses[j].north
+                account[0] = min(account[0], math.sqrt(dx * dx + dy * dy))

@@ -1,0 +1,14 @@
+"""The only place of a flight that reads a clock; everything else is told the time."""
+
+import time
+from datetime import datetime
+
+
+def wall_s() -> float:
+    """Seconds of a clock that never goes back."""
+    return time.perf_counter()
+
+
+def today() -> datetime:
+    """The local date and time, for naming a run."""
+    return datetime.now()

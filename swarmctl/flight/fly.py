@@ -1,0 +1,154 @@
+"""One flight in lockstep from mission to run folder: set up, fly, write down."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from swarmctl import __version__
+from swarmctl.core import bind
+from swarmctl.core.world import World
+from swarmctl.mission.dump import dump
+from swarmctl.mission.model import Mission
+from swarmctl.mission.scenario import Scenario
+from swarmctl.record.folder import RunFolder
+from swarmctl.record.tracks import Picture, draw
+from swarmctl.vehicle.session import Session
+from swarmctl.vehicle.settings import SessionSettings
+
+from . import clock
+from .journal import Journal
+from .lockstep import Lockstep, Vehicles
+from .results import Outcome
+from .swarm import Part, Swarm
+from .track import Track
+
+REPORT_EVERY_S = 10.0
+
+
+@dataclass
+class Orders:
+    """What the operator asks for while the flight is under way: 1 all return, 2 all land."""
+
+    level: int = 0
+    obeyed: int = 0
+
+    def interrupt(self) -> None:
+        """One more Ctrl-C."""
+        self.level += 1
+
+
+Report = Callable[[float, Swarm, World], None]
+"""Called every ten seconds of flight with its time, the swarm and the world."""
+
+
+def warm_up(mission: Mission, algorithm: str) -> bool:
+    """Compile, or load, every kernel a flight calls; returns whether they had to be compiled."""
+    first_time = not bind.is_compiled(algorithm)
+    world = Scenario(mission, ideal=False).world(0, algorithm)
+    world.prepare()
+    for stage in (world.observe, world.share, world.deliver, world.decide):
+        stage(0)
+    world.orders[:] = 1
+    world.begin_return(0.0)
+    world.steer(0.0)
+    bind.plain()["read_poses"](np.zeros((len(world.fleet), 6)), world.poses, 0.0, 0.0, 0.0)
+    return first_time
+
+
+def fly(
+    mission: Mission,
+    seed: int,
+    folder: RunFolder,
+    make_vehicles: Callable[[Mission, World], Vehicles],
+    orders: Orders,
+    report: Report,
+) -> Outcome:
+    """Fly ``mission`` in lockstep and record it.  Raises FlightError, RunFolderError."""
+    scenario = Scenario(mission, ideal=False)
+    world = scenario.world(seed)
+    interval = 1.0 / mission.setpoints.rate_hz
+    settings = SessionSettings(
+        rate_hz=mission.setpoints.rate_hz,
+        setpoint_rate_hz=mission.setpoints.rate_hz,
+        link_loss_s=mission.safety.link_loss_s,
+    )
+    sessions = [Session(i + 1, settings=settings, now=0.0) for i in range(len(world.fleet))]
+    vehicles = make_vehicles(mission, world)
+    text = dump(mission)
+    folder.write_text(folder.mission, text)
+    about = {
+        "algorithm": world.algorithm, "seed": str(seed), "version": __version__, "vehicles": "stub",
+        "endurance_s": " ".join(f"{v.endurance_s or 2.0 * mission.duration_s:g}" for v in mission.fleet),
+    }  # fmt: skip
+    journal = Journal(folder, world, text, about)
+    try:
+        swarm = Swarm(mission, world, sessions, journal)
+        track = Track(len(sessions))
+        lockstep = Lockstep(swarm, sessions, vehicles, journal, track, interval, mission.duration_s)
+        began = clock.wall_s()
+        lockstep.run(_each_tick(lockstep, swarm, world, orders, report))
+    finally:
+        journal.close()
+    wall = clock.wall_s() - began
+    return Outcome(mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0)
+
+
+def _each_tick(
+    lockstep: Lockstep, swarm: Swarm, world: World, orders: Orders, report: Report
+) -> Callable[[float], None]:
+    """Obey the operator, and report now and then."""
+    due = 0.0
+
+    def each_tick(now: float) -> None:
+        nonlocal due
+        if orders.level > orders.obeyed:
+            orders.obeyed = orders.level
+            if orders.level == 1:
+                swarm.return_all("ordered by the operator", now)
+            else:
+                swarm.land_all(now)
+        if now >= due or swarm.part is Part.OVER:
+            due = now + REPORT_EVERY_S
+            report(now, swarm, world)
+
+    return each_tick
+
+
+def write_results(outcome: Outcome, folder: RunFolder) -> dict[str, object]:
+    """Write summary.json and tracks.png; returns the summary."""
+    summary = outcome.summary(str(folder.path))
+    folder.write_json(folder.summary, summary)
+    draw(folder.tracks, picture(outcome))
+    return summary
+
+
+def picture(outcome: Outcome) -> Picture:
+    """What tracks.png shows of a flight."""
+    targets, found_s = outcome.world.scene.targets, outcome.found_s
+    ordered = np.sort(found_s[np.isfinite(found_s)])
+    count = max(len(found_s), 1)
+    east, north = outcome.track.field("east"), outcome.track.field("north")
+    airborne = outcome.track.airborne
+    tracks = [np.column_stack((east[:, i], north[:, i]))[airborne[:, i]] for i in range(east.shape[1])]
+    times = np.concatenate(([0.0], ordered, [outcome.searched_s]))
+    fraction = np.concatenate(([0.0], np.arange(1, len(ordered) + 1) / count, [len(ordered) / count]))
+    return Picture(
+        algorithm=outcome.world.algorithm,
+        border=outcome.regions.border,
+        keep_outs=outcome.regions.keep_outs,
+        targets=np.column_stack((targets["east"], targets["north"])),
+        found=np.isfinite(found_s),
+        tracks=tracks,
+        times_s=times,
+        fraction=fraction,
+        crossings=outcome.summary("")["time_to_s"],
+        duration_s=max(outcome.searched_s, 1.0),
+        subtitle=f"{outcome.mission.name}, seed {outcome.seed}",
+    )
+
+
+def default_folder(out: Path | None, algorithm: str) -> RunFolder:
+    """The run's folder: ``out``, or one named by the time."""
+    return RunFolder.create(out, algorithm=algorithm, now=clock.today())

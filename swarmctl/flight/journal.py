@@ -1,0 +1,90 @@
+"""The flight's recorder: what the loop tells it goes to flight.mcap and flight.tlog, the oldest first."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from swarmctl.core.world import World
+from swarmctl.record import rows
+from swarmctl.record.folder import RunFolder
+from swarmctl.record.mcap_log import Channel, McapLog
+from swarmctl.record.tlog import TlogWriter
+
+from . import clock
+
+FLUSH_S = 1.0
+"""At the most so much of a flight, by the wall's clock, is lost in a crash."""
+
+
+class Journal:
+    """Writes one flight.  Raises RunFolderError where the disk refuses; ``close`` in any case."""
+
+    def __init__(self, folder: RunFolder, world: World, mission_text: str, about: Mapping[str, str]) -> None:
+        self._world = world
+        self._log = McapLog(folder.mcap)
+        self._tlog = TlogWriter(folder.tlog)
+        self._tick_rows = np.zeros(len(world.fleet), rows.TICK)
+        self._flushed = clock.wall_s()
+        self._log.attach("mission.yaml", mission_text)
+        self._log.metadata("flight", about)
+        once = (
+            ("/rules", world.rules), ("/fleet", world.fleet), ("/settings", world.settings),
+            ("/targets", world.scene.targets), ("/fence", rows.fence(world)),
+        )  # fmt: skip
+        for topic, array in once:
+            self._log.write_rows(self._log.channel(topic, array.dtype), 0, 0.0, array)
+        self._observations = self._log.channel("/observations", rows.OBSERVATION)
+        self._beacons = self._log.channel("/beacons", world.beacons.dtype)
+        self._heard = self._log.channel("/heard", rows.HEARD)
+        self._decisions = self._log.channel("/decisions", rows.DECISION)
+        self._ticks = self._log.channel("/ticks", rows.TICK)
+
+    def state(self, tick: int, now: float) -> None:
+        """Before a planner tick: all memory."""
+        self._log.write_bytes("/state", tick, now, rows.dump_state(self._world))
+
+    def planner_tick(self, tick: int, now: float) -> None:
+        """After a planner tick: what passed between its stages."""
+        world, slot = self._world, tick % self._world.depth
+        write: tuple[tuple[Channel, rows.Records], ...] = (
+            (self._observations, rows.observations(world)),
+            (self._beacons, world.beacons[slot]),
+            (self._heard, rows.heard(world, slot)),
+            (self._decisions, rows.decisions(world)),
+        )
+        for channel, array in write:
+            self._log.write_rows(channel, tick, now, array)
+
+    def before_steering(self) -> None:
+        """The guard's inputs at this setpoint tick."""
+        rows.tick_inputs(self._world, self._tick_rows)
+
+    def after_steering(self, tick: int, now: float) -> None:
+        """The guard's outputs; the tick is written."""
+        rows.tick_outputs(self._world, self._tick_rows)
+        self._log.write_rows(self._ticks, tick, now, self._tick_rows)
+
+    def frames(self, now: float, frames: list[bytes]) -> None:
+        """MAVLink frames of either direction."""
+        self._tlog.write(now, frames)
+
+    def event(self, now: float, vehicle: int, kind: str, text: str) -> None:
+        """Something happened to a vehicle (its system id; 0: to the flight)."""
+        self._log.write_json(
+            "/events", now, {"time_s": round(now, 3), "vehicle": vehicle, "kind": kind, "text": text}
+        )
+
+    def breathe(self) -> None:
+        """Give what is older than a second, by the wall, to the operating system."""
+        wall = clock.wall_s()
+        if wall - self._flushed >= FLUSH_S:
+            self._flushed = wall
+            self._log.flush()
+            self._tlog.flush()
+
+    def close(self) -> None:
+        """Finish both files."""
+        try:
+            self._log.close()
+        finally:
+            self._tlog.close()

@@ -1,0 +1,225 @@
+"""The swarm: sessions on one side, the compiled loop on the other, tick by tick.
+
+All vehicles take off, wait for one another at the barrier, search, return and land.  A tick reads telemetry
+into poses, plans if a planner period has passed, steers (homing and guard) and sends the setpoints.  It knows
+neither sockets nor clocks: whoever drives it, in lockstep or live, says what time it is.
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+
+import numpy as np
+
+from swarmctl.core import bind, stages
+from swarmctl.core.world import World
+from swarmctl.mission.model import Mission
+from swarmctl.record.rows import STATE_S
+from swarmctl.vehicle.events import Event, EventKind
+from swarmctl.vehicle.phases import Phase
+from swarmctl.vehicle.session import OrderError, Session
+
+from .journal import Journal
+
+STANDING_M = 5.0
+"""A vehicle must stand within so much of the place where the mission expects it."""
+
+STAGE_OF = {
+    Phase.TAKING_OFF: stages.TAKE_OFF,
+    Phase.HOLDING: stages.HOLD,
+    Phase.ENGAGING: stages.HOLD,
+    Phase.LANDING: stages.LAND,
+    Phase.LANDED: stages.LANDED,
+}
+FLYING = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGING, Phase.ENGAGED, Phase.LANDING)
+GONE = (Phase.FAILED, Phase.RELEASED, Phase.LOST)
+QUIET = (EventKind.PHASE, EventKind.TEXT)
+
+
+class FlightError(Exception):
+    """The flight cannot begin or go on; the message says which vehicle and why."""
+
+
+class Part(Enum):
+    """What the swarm as a whole is doing."""
+
+    PREPARING = "preparing"
+    TAKING_OFF = "taking off"
+    SEARCHING = "searching"
+    RETURNING = "returning"
+    OVER = "over"
+
+
+class Swarm:
+    """One flight of ``world``'s vehicles, session i flying row i."""
+
+    def __init__(self, mission: Mission, world: World, sessions: Sequence[Session], journal: Journal) -> None:
+        self.part = Part.PREPARING
+        self.search_began: float | None = None
+        self.refused = False
+        self.decisions = 0
+        self.messages: list[list[str]] = [[] for _ in sessions]  #: what happened to each vehicle, for people
+        self.in_range_total = 0
+        self.seen = np.zeros((len(sessions), len(world.scene.targets)), bool)  #: by each vehicle's own sensor
+        self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
+        origin = mission.origin
+        self._origin = (origin.lat, origin.lon, origin.alt_m)
+        self._read_poses = bind.plain()["read_poses"]
+        self._wire = np.zeros((len(sessions), 6))
+        self._period = round(mission.planner.period_s * mission.setpoints.rate_hz)
+        self._state_every = max(1, round(STATE_S / mission.planner.period_s))
+        self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
+        self._began_at = 0
+        self._was_airborne = [False] * len(sessions)
+
+    @property
+    def planner_tick(self) -> int:
+        """How many planner periods have been planned."""
+        return self.decisions // len(self._sessions)
+
+    def return_all(self, why: str, now: float) -> None:
+        """Send everyone home who searches; before the search, land everyone where it is."""
+        if self.part in (Part.RETURNING, Part.OVER):
+            return
+        self._journal.event(now, 0, "return", why)
+        if self.part is not Part.SEARCHING:
+            self._land_airborne()
+        else:
+            self._world.orders[:] = self._world.errands["stage"] == stages.SEARCH
+        self.part = Part.RETURNING
+
+    def land_all(self, now: float) -> None:
+        """Land everyone where it is, at once."""
+        self._journal.event(now, 0, "land", "ordered by the operator")
+        self._land_airborne()
+        self.part = Part.RETURNING
+
+    def tick(self, k: int, now: float) -> None:
+        """One setpoint tick at flight time ``now``; the sessions have taken in what arrived by then."""
+        self._take_events(now)
+        self._read_telemetry()
+        self._go_on(k, now)
+        self._follow_stages()
+        ahead = k - self._began_at
+        if self.part is Part.SEARCHING and ahead % self._period == 0:
+            if ahead // self._period < self._planner_ticks:
+                self._plan(ahead // self._period, now)
+            else:
+                self.return_all("the search is over", now)
+        if self.part is not Part.PREPARING:
+            self._steer(k, now)
+
+    def _take_events(self, now: float) -> None:
+        """Pass on what sessions report, and act on vehicles that dropped out."""
+        for i, session in enumerate(self._sessions):
+            for event in session.events():
+                self._journal.event(event.time, event.system, event.kind.value, event.text)
+                if event.kind not in QUIET:
+                    self.messages[i].append(f"{event.time:.1f} s: {event.text}")
+                self._mind(event, now)
+
+    def _mind(self, event: Event, now: float) -> None:
+        """A vehicle failed, was taken over or is silent: the mission says whether the others go on."""
+        if event.kind not in (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST):
+            return
+        left = sum(session.phase not in GONE for session in self._sessions)
+        safety = self._mission.safety
+        if self.part is Part.PREPARING:
+            self.refused = True
+        if safety.if_one_fails == "abort" or left < safety.minimum_vehicles:
+            self.return_all(event.text, now)
+
+    def _read_telemetry(self) -> None:
+        for i, session in enumerate(self._sessions):
+            t = session.telemetry
+            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up)
+        self._read_poses(self._wire, self._world.poses, *self._origin)
+
+    def _go_on(self, k: int, now: float) -> None:
+        """Move on to the next part of the flight when everybody is ready for it."""
+        active = [session for session in self._sessions if session.phase not in GONE]
+        if self.part is Part.PREPARING and active and all(s.phase is Phase.READY for s in active):
+            self._take_off(now)
+        elif self.part is Part.TAKING_OFF:
+            for session in active:
+                if session.phase is Phase.HOLDING:
+                    session.engage()
+            if active and all(session.phase is Phase.ENGAGED for session in active):
+                self._begin_search(k, now)
+        elif self.part is Part.RETURNING and not any(s.phase in FLYING for s in self._sessions):
+            self.part = Part.OVER
+        elif self.part is not Part.OVER and not active:
+            self.part = Part.OVER
+
+    def _take_off(self, now: float) -> None:
+        """Everybody is ready: check where they stand, then go."""
+        self._check_places()
+        self.part = Part.TAKING_OFF
+        self._journal.event(now, 0, "take-off", f"{len(self._sessions)} vehicles")
+        for i, session in enumerate(self._sessions):
+            if session.phase is Phase.READY:
+                session.take_off(float(self._world.fleet[i]["altitude"]))
+
+    def _check_places(self) -> None:
+        """Raise FlightError if a vehicle does not stand where the mission expects it."""
+        poses, fleet = self._world.poses, self._world.fleet
+        off = np.hypot(poses["east"] - fleet["pad_east"], poses["north"] - fleet["pad_north"])
+        for i in np.flatnonzero(off > STANDING_M).tolist():
+            raise FlightError(
+                f"vehicle {self._sessions[i].system} stands {off[i]:.0f} m from its launch place"
+                " (check the mission's origin and launch)"
+            )
+
+    def _begin_search(self, k: int, now: float) -> None:
+        """The barrier opens: from this tick on everybody follows its planner."""
+        self._world.prepare()
+        engaged = [session.phase is Phase.ENGAGED for session in self._sessions]
+        self._world.errands["stage"][engaged] = stages.SEARCH
+        self.part, self.search_began, self._began_at = Part.SEARCHING, now, k
+        self._journal.event(now, 0, "search", "all vehicles are up")
+
+    def _follow_stages(self) -> None:
+        """Stages that firmware flies follow the session; those that the loop flies are the loop's own."""
+        errands = self._world.errands
+        for i, session in enumerate(self._sessions):
+            stage = STAGE_OF.get(session.phase)
+            if stage is not None:
+                self._was_airborne[i] = True
+                errands[i]["stage"] = stage
+            elif session.phase in GONE and not self._was_airborne[i]:
+                errands[i]["stage"] = stages.GROUND
+            elif session.phase is Phase.ENGAGED and errands[i]["stage"] == stages.LAND:
+                session.land()
+
+    def _land_airborne(self) -> None:
+        for session in self._sessions:
+            try:
+                session.land()
+            except OrderError:
+                continue  # on the ground, or no longer ours
+
+    def _plan(self, tick: int, now: float) -> None:
+        """Sense → know ⇄ radio → plan, for everybody."""
+        world = self._world
+        if tick % self._state_every == 0:
+            self._journal.state(tick, now)
+        world.observe(tick)
+        world.share(tick)
+        world.deliver(tick)
+        world.decide(tick)
+        self._journal.planner_tick(tick, now)
+        self.decisions += len(self._sessions)
+        for i, count in enumerate(world.report_count):
+            serials = world.reports[i, :count]["id"]
+            self.seen[i, serials[serials < self.seen.shape[1]]] = True
+        self.in_range_total += int(world.knowledge["in_range"].sum())
+
+    def _steer(self, k: int, now: float) -> None:
+        """Homing and guard for everybody, and the setpoints to those that take them."""
+        world = self._world
+        self._journal.before_steering()
+        if world.orders.any():
+            world.begin_return(now)
+        world.steer(now)
+        self._journal.after_steering(k, now)
+        for session, (v_east, v_north, up, _) in zip(self._sessions, world.setpoints.tolist(), strict=True):
+            session.setpoint(v_east, v_north, up)

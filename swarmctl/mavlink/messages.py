@@ -1,0 +1,113 @@
+"""The frequent messages as typed tuples, in wire order, and what is needed to pack and unpack them.
+
+Field names, units and values are pymavlink's own, and so are the struct and the checksum seed of each
+message: nothing about the wire format is written down a second time.  The order of the fields is the one
+on the wire (large types first), which is what lets a payload be unpacked straight into the tuple; the
+dialect is asked at import whether that still holds.
+"""
+
+import struct
+from typing import Any, NamedTuple
+
+from .dialect import mav
+
+
+class GlobalPositionInt(NamedTuple):
+    """GLOBAL_POSITION_INT: degrees × 1e7, mm (above sea level, above home), cm/s north east down, 0.01°."""
+
+    time_boot_ms: int
+    lat: int
+    lon: int
+    alt: int
+    relative_alt: int
+    vx: int
+    vy: int
+    vz: int
+    hdg: int
+
+
+class LocalPositionNed(NamedTuple):
+    """LOCAL_POSITION_NED: metres and m/s north, east, down from the vehicle's own origin."""
+
+    time_boot_ms: int
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+
+
+class Attitude(NamedTuple):
+    """ATTITUDE: radians and rad/s."""
+
+    time_boot_ms: int
+    roll: float
+    pitch: float
+    yaw: float
+    rollspeed: float
+    pitchspeed: float
+    yawspeed: float
+
+
+class Heartbeat(NamedTuple):
+    """HEARTBEAT: who is there, in which mode, armed or not."""
+
+    custom_mode: int
+    type: int
+    autopilot: int
+    base_mode: int
+    system_status: int
+    mavlink_version: int
+
+
+class SetPositionTargetLocalNed(NamedTuple):
+    """SET_POSITION_TARGET_LOCAL_NED: a setpoint, of which ``type_mask`` names the fields to ignore."""
+
+    time_boot_ms: int
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+    afx: float
+    afy: float
+    afz: float
+    yaw: float
+    yaw_rate: float
+    type_mask: int
+    target_system: int
+    target_component: int
+    coordinate_frame: int
+
+
+class HotMessage(NamedTuple):
+    """How to pack and unpack one frequent message."""
+
+    message_id: int
+    fields: type[Any]
+    payload: struct.Struct
+    crc_extra: bytes
+
+
+def _hot(fields: type[Any]) -> HotMessage:
+    """Build from the dialect, which must agree on the order of the fields."""
+    for message in mav.mavlink_map.values():
+        if message.msgname.replace("_", "") == fields.__name__.upper():
+            if tuple(message.ordered_fieldnames) != fields._fields:
+                raise TypeError(f"{message.msgname}: the installed pymavlink has other fields than {fields}")
+            return HotMessage(message.id, fields, message.unpacker, bytes([message.crc_extra]))
+    raise TypeError(f"the installed pymavlink has no message {fields.__name__}")
+
+
+GLOBAL_POSITION_INT = _hot(GlobalPositionInt)
+LOCAL_POSITION_NED = _hot(LocalPositionNed)
+ATTITUDE = _hot(Attitude)
+HEARTBEAT = _hot(Heartbeat)
+SET_POSITION_TARGET_LOCAL_NED = _hot(SetPositionTargetLocalNed)
+
+HOT_MESSAGES = {
+    hot.message_id: hot
+    for hot in (GLOBAL_POSITION_INT, LOCAL_POSITION_NED, ATTITUDE, HEARTBEAT, SET_POSITION_TARGET_LOCAL_NED)
+}

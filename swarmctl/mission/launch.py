@@ -1,0 +1,54 @@
+"""Where vehicles start, and on which heading.
+
+Headings are drawn evenly from a quarter turn that looks into the area (the paper's [0, π/2] from the corner of
+a rectangle), from the whole circle where vehicles start in the open.  They are handed out so that no two rays
+cross: the assignment of pads to far points on the rays with the least total length has no crossing.
+"""
+
+import math
+
+import numpy as np
+import shapely
+from scipy.optimize import linear_sum_assignment
+
+from swarmctl.core.arrays import Floats
+from swarmctl.core.randoms import LAUNCH, uniform
+
+from .geometry import Regions
+from .model import Mission
+
+FAR_M = 1e6
+
+
+def ideal_start(regions: Regions) -> Floats:
+    """Where all vehicles start in ideal dynamics, (2,): the corner of the border that lies south-west most."""
+    corner: Floats = regions.border[np.argmin(regions.border.sum(axis=1))]
+    return corner
+
+
+def draw_headings(mission: Mission, regions: Regions, starts: Floats, seed: int) -> Floats:
+    """Initial headings (V,) in radians from east, one drawn for each vehicle at ``starts`` (V, 2)."""
+    first, width = _opening(mission, regions, starts)
+    draws = np.array([uniform(seed, i, 0, LAUNCH) for i in range(len(starts))])
+    return first + width * draws
+
+
+def _opening(mission: Mission, regions: Regions, starts: Floats) -> tuple[float, float]:
+    """The first heading and the width of the range that headings are drawn from."""
+    if mission.launch != "corner":
+        return 0.0, 2.0 * math.pi
+    if mission.area.size_m is not None:
+        return 0.0, math.pi / 2.0
+    centre = shapely.Polygon(regions.border).centroid
+    east, north = starts.mean(axis=0)
+    return math.atan2(centre.y - north, centre.x - east) - math.pi / 4.0, math.pi / 2.0
+
+
+def uncross(pads: Floats, headings: Floats) -> Floats:
+    """The same headings (V,), handed out to ``pads`` (V, 2) so that the rays do not cross."""
+    far = FAR_M * np.column_stack((np.cos(headings), np.sin(headings)))
+    # |far - pad| less its common part: what is left keeps its digits.
+    lengths = np.sqrt(((pads[:, None] - far[None]) ** 2).sum(axis=2)) - FAR_M
+    _, order = linear_sum_assignment(lengths)
+    handed: Floats = headings[order]
+    return handed

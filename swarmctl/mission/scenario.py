@@ -1,0 +1,158 @@
+"""From a mission and a seed to the arrays that fly: the one way a World comes about.
+
+A :class:`Scenario` keeps what all runs of a mission share (regions, the vehicles); :meth:`Scenario.world` adds
+what a seed draws: where targets lie and on which headings vehicles start.
+"""
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from swarmctl.core import bind, state
+from swarmctl.core.arrays import Floats, Records
+from swarmctl.core.world import Fences, Scene, World, make_scene, make_settings
+
+from . import geometry, launch, pads
+from .model import Mission, Radio, Vehicle
+
+CLIMB_MPS = 3.0  # the stub's vertical limits, those of a middling multicopter
+DESCENT_MPS = 2.0
+CLIMB_ACCELERATION_MPS2 = 2.0
+LANDING_MPS = 0.7
+WANDER_SHARE = 0.15  # of the cluster radius: how far a wandering target swings to each side
+WANDER_MPS = 1.0
+BEACON_BYTES, CONTACT_BYTES = 40, 16  # what a beacon and each contact in it take on a limited radio
+
+
+class Scenario:
+    """Everything about a mission that no seed changes.
+
+    ``ideal``: x += v dt from one point on the border, no margin, no guard; else a multicopter under guard.
+    ``stands`` (V, 2) replaces the mission's pads: where vehicles were found standing.
+    """
+
+    def __init__(self, mission: Mission, *, ideal: bool, stands: Floats | None = None) -> None:
+        self.mission = mission
+        self.ideal = ideal
+        self.regions = geometry.regions(mission)
+        self._stands = stands
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Where each vehicle starts, (V, 2)."""
+        if self.ideal:
+            return np.tile(launch.ideal_start(self.regions), (len(self.mission.fleet), 1))
+        found = self._stands if self._stands is not None else pads.launch_pads(self.mission)
+        if found is None:
+            raise ValueError("launch: as_found needs the places where the vehicles were found")
+        return found
+
+    @cached_property
+    def fences(self) -> Fences:
+        """The fence as drawn, as planners see it, and as the guard keeps it."""
+        r = self.regions
+        return Fences(r.raw, r.raw if self.ideal else r.plan, r.guard)
+
+    def fleet(self, seed: int) -> Records:
+        """The vehicles (V,) VEHICLE, with this seed's initial headings."""
+        mission = self.mission
+        fleet = np.zeros(len(mission.fleet), state.VEHICLE)
+        for row, vehicle in zip(fleet, mission.fleet, strict=True):
+            _describe(row, vehicle, mission)
+        fleet["pad_east"], fleet["pad_north"] = self.starts.T
+        headings = launch.draw_headings(mission, self.regions, self.starts, seed)
+        if not self.ideal:
+            headings = launch.uncross(self.starts, headings)
+        fleet["heading_east"], fleet["heading_north"] = np.cos(headings), np.sin(headings)
+        return fleet
+
+    def rules(self, seed: int, targets: int) -> Records:
+        """What holds for the whole run, (1,) RULES."""
+        mission = self.mission
+        period = mission.planner.period_s
+        rules = np.zeros(1, state.RULES)
+        row = rules[0]
+        row["seed"], row["targets"] = seed, targets
+        row["period"], row["interval"] = period, 1.0 / mission.setpoints.rate_hz
+        row["separation"], row["duration"] = mission.safety.separation_m, mission.duration_s
+        row["metric"], row["ideal"] = mission.planner.terms == "metric", self.ideal
+        row["radio_delay"] = math.ceil(mission.radio.delay_s / period - 1e-9)
+        row["beacon_contacts"] = _contacts_a_beacon(mission.radio, period)
+        row["alarm_slots"] = max(_alarm_slots(v, mission.duration_s) for v in mission.fleet)
+        row["landing_speed"] = LANDING_MPS
+        return rules
+
+    def scene(self, seed: int) -> Scene:
+        """What there is to find with this seed."""
+        wanted = self.mission.targets
+        places, clusters = self._placed() if wanted.positions_m is not None else self._drawn(seed)
+        wander = WANDER_SHARE * wanted.radius_m if wanted.motion == "wander" else 0.0
+        cell = max(v.sensor.range_m for v in self.mission.fleet)
+        return make_scene(places, clusters, wander, WANDER_MPS, cell)
+
+    def world(self, seed: int, algorithm: str | None = None) -> World:
+        """All arrays of one run, vehicles standing at their start."""
+        name = algorithm or self.mission.planner.algorithm
+        scene = self.scene(seed)
+        given = self.mission.planner.parameters.get(name, {})
+        settings = make_settings(name, {k: float(v) for k, v in given.items()})
+        world = World(
+            name, self.fleet(seed), self.rules(seed, len(scene.targets)), scene, self.fences, settings
+        )
+        world.poses["east"], world.poses["north"] = self.starts.T
+        return world
+
+    def _placed(self) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
+        places = np.array(self.mission.targets.positions_m, dtype=float).reshape(-1, 2)
+        return places, np.zeros(len(places), np.int64)
+
+    def _drawn(self, seed: int) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
+        wanted, kernels = self.mission.targets, bind.plain()
+        low, high = self.regions.border.min(axis=0), self.regions.border.max(axis=0)
+        # Centres lie a radius inside the area where it is wide enough, so that clusters are not cut in half.
+        inset = np.minimum(wanted.radius_m, (high - low) / 4.0)
+        box = np.array([low[0] + inset[0], high[0] - inset[0], low[1] + inset[1], high[1] - inset[1]])
+        centres = np.zeros((wanted.clusters, 2))
+        places, clusters = np.zeros((wanted.count, 2)), np.zeros(wanted.count, np.int64)
+        kernels["place_centres"](
+            seed,
+            wanted.clusters,
+            wanted.radius_m,
+            self.regions.raw,
+            box,
+            np.ascontiguousarray(self.starts),
+            centres,
+        )
+        kernels["lay_out"](
+            seed, wanted.radius_m, wanted.hot_spot_share, self.regions.raw, centres,
+            np.zeros(wanted.clusters), np.zeros(wanted.clusters, np.int64), places, clusters,
+        )  # fmt: skip
+        return places, clusters
+
+
+def _describe(row: np.void, vehicle: Vehicle, mission: Mission) -> None:
+    """Fill one VEHICLE record with what the mission says of it."""
+    acceleration = mission.safety.max_acceleration_mps2
+    row["speed"], row["altitude"] = vehicle.speed_mps, vehicle.altitude_m
+    row["acceleration"] = row["braking"] = acceleration
+    row["climb"], row["descent"] = CLIMB_MPS, DESCENT_MPS
+    row["climb_acceleration"] = CLIMB_ACCELERATION_MPS2
+    sensor, radio = vehicle.sensor, vehicle.radio
+    row["sensor_range"], row["detection_probability"] = sensor.range_m, sensor.detection_probability
+    row["alarms_per_second"] = sensor.false_alarms_per_hour / 3600.0
+    row["position_noise"] = sensor.position_noise_m
+    row["radio_range"], row["radio_loss"] = radio.range_m, radio.loss
+
+
+def _contacts_a_beacon(radio: Radio, period: float) -> int:
+    """How many contacts fit a beacon; -1: all."""
+    if radio.bandwidth_bps is None:
+        return -1
+    return max(0, int((radio.bandwidth_bps * period / 8.0 - BEACON_BYTES) // CONTACT_BYTES))
+
+
+def _alarm_slots(vehicle: Vehicle, duration: float) -> int:
+    """Serial numbers set aside for one vehicle's false alarms: twice what is expected, and some."""
+    rate = vehicle.sensor.false_alarms_per_hour / 3600.0
+    return math.ceil(2.0 * rate * duration) + 20 if rate > 0.0 else 0

@@ -1,0 +1,251 @@
+"""Replay: recorded inputs in, the recorded decisions out, one step at a time.
+
+The recording holds what each stage was given, so nothing is simulated: sensor reports, beacons and who heard
+them go into know and plan, poses and orders into homing and guard, and what comes out is compared bit for bit
+with what was recorded.  Memory is chained from tick to tick and put back at every snapshot.  A decision counts
+as identical if the wish and every setpoint until the next decision are.
+"""
+
+import json
+from collections import defaultdict
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from swarmctl.core import state
+from swarmctl.core.arrays import Records
+from swarmctl.core.world import Fences, Scene, World, make_settings
+
+from . import rows
+from .errors import LogError
+from .mcap_read import Log, Rows
+
+ONCE = ("/rules", "/fleet", "/settings", "/targets", "/fence")
+
+
+@dataclass
+class Replayed:
+    """What a replay found.  ``largest_difference_mps``: of any velocity, wished or set."""
+
+    decisions: int = 0
+    identical: int = 0
+    setpoints: int = 0
+    setpoints_identical: int = 0
+    largest_difference_mps: float = 0.0
+    first_difference: dict[str, Any] | None = None
+    truncated: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of ``replay --json``."""
+        return asdict(self)
+
+    def as_text(self) -> str:
+        """A few lines for a person: how many are identical, or the first that is not and what went in."""
+        lines = [
+            f"{self.identical} of {self.decisions} decisions identical, "
+            f"{self.setpoints_identical} of {self.setpoints} setpoints"
+        ]
+        if not self.same:
+            lines.append(
+                f"velocities differ by up to {self.largest_difference_mps:.6g} m/s; the first that does:"
+            )
+            lines.append(json.dumps(self.first_difference, indent=2))
+        if self.truncated:
+            lines.append("the recording is cut off; this is all that it holds")
+        return "\n".join(lines)
+
+    @property
+    def same(self) -> bool:
+        """Whether everything was recomputed to the last bit."""
+        return self.identical == self.decisions and self.setpoints_identical == self.setpoints
+
+
+def as_now(recorded: Records, dtype: np.dtype[Any], topic: str) -> Records:
+    """Recorded rows as today's dtype, by the fields' names.  Raises LogError if one is missing."""
+    missing = set(dtype.names or ()) - set(recorded.dtype.names or ())
+    if missing:
+        raise LogError(
+            f"{topic}: recorded by a version without {', '.join(sorted(missing))}; use that version"
+        )
+    converted = np.zeros(len(recorded), dtype)
+    for name in dtype.names or ():
+        converted[name] = recorded[name]
+    return converted
+
+
+def open_world(log: Log, algorithm: str | None = None) -> World:
+    """The world of a recording, at its start; with another algorithm, that one's own default settings."""
+    found: dict[str, Records] = {}
+    for message in log.rows(*ONCE):
+        found.setdefault(message.topic, message.rows)
+        if len(found) == len(ONCE):
+            break
+    about = log.metadata.get("flight", {})
+    if len(found) < len(ONCE) or "algorithm" not in about:
+        raise LogError(f"{log.path}: no flight in it (the recording ended before it began)")
+    fence = as_now(found["/fence"], rows.FENCE, "/fence")
+    edges = [
+        np.column_stack([fence[n][fence["kind"] == kind] for n in ("x0", "y0", "x1", "y1")])
+        for kind in range(3)
+    ]
+    targets = as_now(found["/targets"], state.TARGET, "/targets")
+    # Replay senses nothing: the targets are here for their number and for pictures.
+    scene = Scene(targets, np.zeros(1, state.GRID), np.zeros(2, np.int64))
+    recorded = about["algorithm"]
+    settings = found["/settings"] if algorithm in (None, recorded) else make_settings(str(algorithm), {})
+    return World(
+        algorithm or recorded,
+        as_now(found["/fleet"], state.VEHICLE, "/fleet"),
+        as_now(found["/rules"], state.RULES, "/rules"),
+        scene,
+        Fences(*(np.ascontiguousarray(e) for e in edges)),
+        settings,
+    )
+
+
+def replay(log: Log, algorithm: str | None = None) -> Replayed:
+    """Recompute a recording's decisions, with ``algorithm`` in place of the recorded one if it is another.
+
+    With another algorithm only the plans are compared: the recorded setpoints followed from other wishes.
+    """
+    other = algorithm is not None and algorithm != log.metadata.get("flight", {}).get("algorithm")
+    replayer = _Replayer(open_world(log, algorithm), other)
+    pending: dict[str, Rows] = {}
+    for message in log.rows():
+        if message.topic == "/ticks":
+            replayer.tick(message, pending)
+            pending.clear()
+        elif message.topic not in ONCE:
+            pending[message.topic] = message
+    replayer.result.truncated = log.truncated
+    return replayer.finish()
+
+
+@dataclass
+class _Replayer:
+    """A world into which recorded ticks are fed."""
+
+    world: World
+    other: bool
+    result: Replayed = field(default_factory=Replayed)
+    begun: bool = False
+
+    def __post_init__(self) -> None:
+        self.good = np.zeros(len(self.world.fleet), bool)  # the current decision's standing, per vehicle
+
+    def tick(self, message: Rows, pending: dict[str, Rows]) -> None:
+        """One recorded setpoint tick, with the planner tick that came before it, if one did."""
+        recorded = as_now(message.rows, rows.TICK, "/ticks")
+        for name in state.POSE.names or ():
+            self.world.poses[name] = recorded[name]
+        if "/decisions" in pending:
+            self._plan(pending)
+        if not self.other:
+            self._steer(message, recorded)
+
+    def finish(self) -> Replayed:
+        """Close the last decision and give the result."""
+        if self.begun:
+            self.result.identical += int(self.good.sum())
+            self.begun = False
+        return self.result
+
+    def _plan(self, pending: dict[str, Rows]) -> None:
+        world, decided = self.world, pending["/decisions"]
+        tick = decided.tick
+        self.finish()
+        if not self.begun and self.result.decisions == 0:
+            world.prepare()
+        if "/state" in pending and not self.other:
+            rows.load_state(world, pending["/state"].rows.tobytes())
+        self._give_reports(as_now(pending["/observations"].rows, rows.OBSERVATION, "/observations"))
+        world.share(tick)
+        if not self.other:
+            world.beacons[tick % world.depth] = as_now(pending["/beacons"].rows, state.BEACON, "/beacons")
+        self._give_heard(as_now(pending["/heard"].rows, rows.HEARD, "/heard"), tick % world.depth)
+        world.decide(tick)
+        self.begun = True
+        self.good[:] = True
+        self.result.decisions += len(world.fleet)
+        self._compare(
+            "plan",
+            tick,
+            decided.time_s,
+            as_now(decided.rows, rows.DECISION, "/decisions"),
+            rows.decisions(world),
+        )
+
+    def _give_reports(self, recorded: Records) -> None:
+        self.world.report_count[:] = 0
+        for row in recorded:
+            vehicle = int(row["vehicle"])
+            place = self.world.reports[vehicle, self.world.report_count[vehicle]]
+            for name in state.CONTACT.names or ():
+                place[name] = row[name]
+            self.world.report_count[vehicle] += 1
+
+    def _give_heard(self, recorded: Records, slot: int) -> None:
+        senders: dict[int, list[int]] = defaultdict(list)
+        for receiver, sender in recorded.tolist():
+            senders[receiver].append(sender)
+        for i in range(len(self.world.fleet)):
+            self.world.heard_count[slot, i] = len(senders[i])
+            self.world.heard[slot, i, : len(senders[i])] = senders[i]
+
+    def _steer(self, message: Rows, recorded: Records) -> None:
+        world = self.world
+        world.errands["stage"] = recorded["stage"]
+        world.orders[:] = recorded["ordered_home"]
+        if world.orders.any():
+            world.begin_return(message.time_s)
+        world.steer(message.time_s)
+        computed = recorded.copy()
+        rows.tick_outputs(world, computed)
+        self.result.setpoints += len(computed)
+        same = self._compare("guard", message.tick, message.time_s, recorded, computed)
+        self.result.setpoints_identical += same
+
+    def _compare(self, stage: str, tick: int, time_s: float, recorded: Records, computed: Records) -> int:
+        """Count the rows that are equal bit for bit, and keep the first that is not."""
+        if recorded.tobytes() == computed.tobytes():
+            return len(recorded)
+        same = np.array([a.tobytes() == b.tobytes() for a, b in zip(recorded, computed, strict=True)])
+        self.good &= same
+        for name in computed.dtype.names or ():
+            if name.endswith(("v_east", "v_north")):
+                difference = float(np.nanmax(np.abs(recorded[name] - computed[name]), initial=0.0))
+                self.result.largest_difference_mps = max(self.result.largest_difference_mps, difference)
+        if self.result.first_difference is None and not same.all():
+            i = int(np.flatnonzero(~same)[0])
+            self.result.first_difference = self._explain(stage, tick, time_s, i, recorded[i], computed[i])
+        return int(same.sum())
+
+    def _explain(
+        self, stage: str, tick: int, time_s: float, i: int, recorded: np.void, computed: np.void
+    ) -> dict[str, Any]:
+        """What went in and what came out, for a person to look at."""
+        world, slot = self.world, self.world.arriving(tick) if stage == "plan" else 0
+        heard = world.heard[slot, i, : world.heard_count[slot, i]].tolist() if stage == "plan" else []
+        return {
+            "stage": stage,
+            "tick": tick,
+            "time_s": time_s,
+            "vehicle": i + 1,
+            "input": {
+                "pose": _plain(world.poses[i]),
+                "knowledge": _plain(world.knowledge[i]),
+                "memory": _plain(world.memory[i]),
+                "heard": [j + 1 for j in heard],
+            },
+            "recorded": _plain(recorded),
+            "recomputed": _plain(computed),
+        }
+
+
+def _plain(record: np.void) -> dict[str, Any]:
+    """A record as JSON can hold it; numbers that JSON lacks as text."""
+    return {
+        name: value if not isinstance(value, float) or np.isfinite(value) else str(value)
+        for name, value in zip(record.dtype.names or (), record.tolist(), strict=True)
+    }

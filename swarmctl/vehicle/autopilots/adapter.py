@@ -1,0 +1,92 @@
+"""What the session must know of a firmware, and nothing else of the program ever asks.
+
+Firmwares differ in mode numbers, in the order and the altitude frame of take-off, in which setpoints they
+fly, in when they can be armed and in what their parameters are called.  An adapter holds all of that; it
+belongs to one vehicle, because some gates are a matter of several messages.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from swarmctl.mavlink.codec import Encoder
+from swarmctl.vehicle.commands import Command
+from swarmctl.vehicle.settings import SessionSettings
+from swarmctl.vehicle.steps import Step
+from swarmctl.vehicle.telemetry import Telemetry
+
+
+@dataclass(frozen=True, slots=True)
+class Modes:
+    """HEARTBEAT.custom_mode of the modes that the session uses, and names for those it may meet.
+
+    ``take_off`` is what the vehicle shows while it climbs, ``engaged`` while it flies our setpoints,
+    ``comeback`` is the firmware's own return.
+    """
+
+    take_off: int
+    hold: int
+    engaged: int
+    land: int
+    comeback: int
+    names: Mapping[int, str]
+
+    def name(self, mode: int) -> str:
+        """The mode's name, or its number."""
+        return self.names.get(mode, f"mode {mode:#x}")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How the vehicle brakes unless it says better, and the parameters that say it.
+
+    A quantity may have several names, newest first: firmwares rename their parameters.
+    """
+
+    braking_mps2: float
+    latency_s: float
+    speed_parameters: tuple[str, ...]
+    acceleration_parameters: tuple[str, ...]
+    climb_parameters: tuple[str, ...]
+    descent_parameters: tuple[str, ...]
+
+
+class Adapter(Protocol):
+    """One firmware's ways, for one vehicle."""
+
+    @property
+    def name(self) -> str:
+        """As in ``--autopilot``: px4, ardupilot."""
+
+    @property
+    def modes(self) -> Modes:
+        """Its mode numbers."""
+
+    @property
+    def limits(self) -> Limits:
+        """Its braking, and the parameters that bound its motion."""
+
+    @property
+    def unwanted_messages(self) -> tuple[int, ...]:
+        """The ids of messages that it sends unasked, often, and that nobody here reads."""
+
+    def set_mode(self, mode: int) -> Command:
+        """The command that changes to one of ``modes``."""
+
+    def take_off(
+        self, telemetry: Telemetry, altitude_m: float, settings: SessionSettings
+    ) -> tuple[Step, ...]:
+        """The steps from standing disarmed to climbing, for ``altitude_m`` above home."""
+
+    def setpoint(
+        self,
+        encoder: Encoder,
+        system: int,
+        telemetry: Telemetry,
+        velocity_en: tuple[float, float],
+        height_m: float,
+    ) -> bytes:
+        """The frame that asks for an east-north velocity (m/s) at a height above home (m)."""
+
+    def observe(self, message_id: int, fields: Any, telemetry: Telemetry) -> None:
+        """Take in any message; sets ``telemetry.healthy`` once the vehicle can be armed."""

@@ -1,0 +1,140 @@
+"""PX4, as observed on v1.17: see the adapter for what each part is for.
+
+The altitude of NAV_TAKEOFF is above mean sea level whatever the frame says, and it comes before arming.
+Velocity is flown with a z position, because a pure velocity setpoint drifts in altitude; z counts down from
+the vehicle's own local origin, so both origin and home must be known.
+"""
+
+from typing import Any
+
+from swarmctl.mavlink.codec import Encoder
+from swarmctl.mavlink.dialect import mav
+from swarmctl.vehicle.commands import CUSTOM_MODE_ENABLED, Command, arm, command, take_off
+from swarmctl.vehicle.settings import SessionSettings
+from swarmctl.vehicle.steps import Step
+from swarmctl.vehicle.telemetry import Telemetry
+
+from .adapter import Limits, Modes
+
+
+def _mode(main: int, sub: int = 0) -> int:
+    """A custom mode number as HEARTBEAT carries it."""
+    return main << 16 | sub << 24
+
+
+_AUTO = 4
+MODES = Modes(
+    take_off=_mode(_AUTO, 2),
+    hold=_mode(_AUTO, 3),
+    engaged=_mode(6),
+    land=_mode(_AUTO, 6),
+    comeback=_mode(_AUTO, 5),
+    names={
+        _mode(1): "MANUAL",
+        _mode(2): "ALTCTL",
+        _mode(3): "POSCTL",
+        _mode(5): "ACRO",
+        _mode(6): "OFFBOARD",
+        _mode(7): "STABILIZED",
+        _mode(_AUTO, 1): "AUTO.READY",
+        _mode(_AUTO, 2): "AUTO.TAKEOFF",
+        _mode(_AUTO, 3): "AUTO.LOITER",
+        _mode(_AUTO, 4): "AUTO.MISSION",
+        _mode(_AUTO, 5): "AUTO.RTL",
+        _mode(_AUTO, 6): "AUTO.LAND",
+    },
+)
+
+# 5 m/s commanded gave 3.0 m/s after a second, which is MPC_ACC_HOR's default; braking is no harder.
+LIMITS = Limits(
+    braking_mps2=3.0,
+    latency_s=0.5,
+    speed_parameters=("MPC_XY_VEL_MAX",),
+    acceleration_parameters=("MPC_ACC_HOR",),
+    climb_parameters=("MPC_Z_VEL_MAX_UP",),
+    descent_parameters=("MPC_Z_VEL_MAX_DN",),
+)
+
+# What the onboard link carries at 10 Hz and more without being asked, besides the position.
+UNWANTED_MESSAGES: tuple[int, ...] = (
+    mav.MAVLINK_MSG_ID_ATTITUDE,
+    mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+    mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS,
+    mav.MAVLINK_MSG_ID_VFR_HUD,
+    mav.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
+    mav.MAVLINK_MSG_ID_HIGHRES_IMU,
+    mav.MAVLINK_MSG_ID_ALTITUDE,
+    mav.MAVLINK_MSG_ID_ODOMETRY,
+)
+
+PREARM_CHECK: int = mav.MAV_SYS_STATUS_PREARM_CHECK
+LOCAL_NED: int = mav.MAV_FRAME_LOCAL_NED
+# Ignored: x, y, vz, the accelerations and the yaw rate. Flown: z, vx, vy and the yaw, 0, which is north.
+VELOCITY_AT_ALTITUDE = 1 | 2 | 32 | 64 | 128 | 256 | 2048
+AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
+
+
+class Px4:
+    """The adapter for PX4."""
+
+    name = "px4"
+    modes = MODES
+    limits = LIMITS
+    unwanted_messages = UNWANTED_MESSAGES
+
+    def set_mode(self, mode: int) -> Command:
+        """DO_SET_MODE takes the main and the sub mode apart."""
+        main, sub = mode >> 16 & 0xFF, mode >> 24 & 0xFF
+        return command(
+            f"DO_SET_MODE {MODES.name(mode)}", mav.MAV_CMD_DO_SET_MODE, CUSTOM_MODE_ENABLED, main, sub
+        )
+
+    def take_off(
+        self, telemetry: Telemetry, altitude_m: float, settings: SessionSettings
+    ) -> tuple[Step, ...]:
+        """NAV_TAKEOFF, then ARM.  Needs the home position.
+
+        The mode may be that of an earlier take-off to another altitude, so the ACK is needed too.
+        """
+        if telemetry.home is None:
+            raise ValueError("take-off needs the home position")
+        patience = settings.command_patience_s
+        return (
+            Step(
+                "take-off mode",
+                patience,
+                command=take_off(telemetry.home.alt_amsl_m + altitude_m),
+                confirmed=lambda t: t.mode == MODES.take_off,
+                needs_ack=True,
+            ),
+            Step("arming", patience, command=arm(), confirmed=lambda t: t.armed),
+        )
+
+    def setpoint(
+        self,
+        encoder: Encoder,
+        system: int,
+        telemetry: Telemetry,
+        velocity_en: tuple[float, float],
+        height_m: float,
+    ) -> bytes:
+        """SET_POSITION_TARGET_LOCAL_NED: z position and vx, vy.  Needs origin and home."""
+        home, origin = telemetry.home, telemetry.origin
+        if home is None or origin is None:
+            raise ValueError("a setpoint needs the home position and the local origin")
+        down = origin[2] - home[2] - height_m
+        v_east, v_north = velocity_en
+        return encoder.set_position_target_local_ned(
+            telemetry.boot_ms, system, AUTOPILOT_COMPONENT, LOCAL_NED, VELOCITY_AT_ALTITUDE,
+            0.0, 0.0, down, v_north, v_east, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        )  # fmt: skip
+
+    def observe(self, message_id: int, fields: Any, telemetry: Telemetry) -> None:
+        """SYS_STATUS's health bit says ready, although present and enabled never show it."""
+        if message_id == mav.MAVLINK_MSG_ID_SYS_STATUS:
+            telemetry.healthy = bool(fields.onboard_control_sensors_health & PREARM_CHECK)

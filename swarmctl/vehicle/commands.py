@@ -1,0 +1,70 @@
+"""MAVLink commands as values, with names that a reader of a failure understands."""
+
+import math
+from typing import NamedTuple
+
+from swarmctl.mavlink.dialect import mav
+
+CUSTOM_MODE_ENABLED: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
+TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED
+IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
+
+Parameters = tuple[float, float, float, float, float, float, float]
+
+
+class Command(NamedTuple):
+    """A COMMAND_LONG: its MAV_CMD number, its seven parameters, and a name for reports."""
+
+    number: int
+    parameters: Parameters
+    name: str
+
+
+def command(name: str, number: int, *parameters: float) -> Command:
+    """A command; the parameters that are not given are 0."""
+    p = (*parameters, *(0.0,) * (7 - len(parameters)))
+    return Command(number, (p[0], p[1], p[2], p[3], p[4], p[5], p[6]), name)
+
+
+def arm() -> Command:
+    """Arm, with all the firmware's checks."""
+    return command("ARM", mav.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+
+def disarm() -> Command:
+    """Disarm; refused in the air."""
+    return command("DISARM", mav.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+
+
+def take_off(altitude_m: float) -> Command:
+    """Take off where the vehicle stands, to an altitude in whatever frame the firmware takes it.
+
+    Pitch, yaw and position are NaN: "as it is".
+    """
+    nan = math.nan
+    return command("NAV_TAKEOFF", mav.MAV_CMD_NAV_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, altitude_m)
+
+
+def message_interval(message_id: int, rate_hz: float) -> Command:
+    """Ask for a message at a rate; 0 turns it off."""
+    interval_us = round(1e6 / rate_hz) if rate_hz > 0 else -1
+    name = f"SET_MESSAGE_INTERVAL {message_name(message_id)}"
+    return command(name, mav.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval_us)
+
+
+def request_message(message_id: int) -> Command:
+    """Ask for one message now."""
+    return command(f"REQUEST_MESSAGE {message_name(message_id)}", mav.MAV_CMD_REQUEST_MESSAGE, message_id)
+
+
+def message_name(message_id: int) -> str:
+    """The MAVLink name of a message."""
+    known = mav.mavlink_map.get(message_id)
+    return str(known.msgname) if known else f"message {message_id}"
+
+
+def result_name(result: int) -> str:
+    """The MAV_RESULT as MAVLink names it, without its prefix."""
+    entry = mav.enums["MAV_RESULT"].get(result)
+    return entry.name.removeprefix("MAV_RESULT_") if entry else f"result {result}"

@@ -1,0 +1,97 @@
+"""One vehicle's end of the wire: frames in, frames out, and the record of both.
+
+Only the vehicle's own frames pass.  A frame that comes twice is recorded but not passed on, or an old
+COMMAND_ACK would answer a new command.  Nor is one that was overtaken on the way, if it tells the vehicle's
+state: an old HEARTBEAT would show a mode that is no more.
+"""
+
+from swarmctl.mavlink.codec import Decoder, Encoder, Frame
+from swarmctl.mavlink.dialect import mav
+
+AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
+GROUND_SYSTEM = 255  #: the only system id that ArduPilot takes for its ground station
+GROUND_COMPONENT: int = mav.MAV_COMP_ID_MISSIONPLANNER
+
+# A frame less than this many numbers behind the newest is late; more means that the sender restarted.
+LATE_FRAMES = 32
+_WINDOW = (1 << LATE_FRAMES) - 1
+
+# Messages of which only the newest is true.
+STATE_MESSAGES: frozenset[int] = frozenset(
+    (
+        mav.MAVLINK_MSG_ID_HEARTBEAT,
+        mav.MAVLINK_MSG_ID_SYS_STATUS,
+        mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mav.MAVLINK_MSG_ID_HOME_POSITION,
+        mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    )
+)
+
+
+class Link:
+    """The link to the vehicle ``system``. ``encoder`` numbers what we send on it."""
+
+    def __init__(self, system: int) -> None:
+        self.system = system
+        self.encoder = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
+        self.received = 0
+        self.late = 0
+        self._decoder = Decoder()
+        self._newest: int | None = None
+        self._seen = 0  # bit k: the frame k numbers behind the newest has come
+        self._outgoing: list[bytes] = []
+        self._traffic: list[bytes] = []
+
+    @property
+    def lost(self) -> int:
+        """Frames missing by sequence number."""
+        return self._decoder.lost
+
+    @property
+    def bad(self) -> int:
+        """Stretches of bytes that were no frame."""
+        return self._decoder.bad
+
+    def take(self, data: bytes) -> list[Frame]:
+        """The autopilot's frames that ``data`` completes, without repeated and outdated ones."""
+        passed = []
+        for frame in self._decoder.feed(data):
+            if frame.system != self.system:
+                continue
+            self.received += 1
+            self._traffic.append(frame.raw)
+            if frame.component == AUTOPILOT_COMPONENT and self._is_news(frame):
+                passed.append(frame)
+        return passed
+
+    def _is_news(self, frame: Frame) -> bool:
+        """Whether a frame has not come before, nor tells of a state that a newer one may have told."""
+        newest = self._newest
+        behind = LATE_FRAMES if newest is None else (newest - frame.sequence) & 0xFF
+        if behind >= LATE_FRAMES:
+            self._seen = (self._seen << (-behind & 0xFF) | 1) & _WINDOW
+            self._newest = frame.sequence
+            return True
+        self.late += 1
+        repeated = self._seen >> behind & 1
+        self._seen |= 1 << behind
+        return not repeated and frame.message_id not in STATE_MESSAGES
+
+    def expect_any(self) -> None:
+        """Take the next frame whatever its number: after a silence the sender may have restarted."""
+        self._newest = None
+
+    def send(self, frame: bytes) -> None:
+        """Queue a frame."""
+        self._outgoing.append(frame)
+        self._traffic.append(frame)
+
+    def outgoing(self) -> list[bytes]:
+        """The queued frames, which are then forgotten."""
+        frames, self._outgoing = self._outgoing, []
+        return frames
+
+    def traffic(self) -> list[bytes]:
+        """All frames of both directions since the last call, in order."""
+        frames, self._traffic = self._traffic, []
+        return frames

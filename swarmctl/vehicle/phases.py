@@ -1,0 +1,120 @@
+"""The session's state machine: one table, from (phase, signal) to (action, next phase).
+
+Signals are what the outside does to a session: telemetry, finished steps, orders, silence.  Actions are the
+methods of ``session.Session`` of that name.  A pair that is not in the table changes nothing.
+``mermaid`` draws the table for the documentation.
+"""
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class Phase(Enum):
+    """Where a session stands."""
+
+    CONNECTING = "connecting"  #: waits for the first heartbeat
+    IDENTIFYING = "identifying"  #: which autopilot, which version
+    CONFIGURING = "configuring"  #: message rates
+    POSITIONING = "positioning"  #: position, origin, home, health
+    READY = "ready"  #: on the ground; may take off
+    TAKING_OFF = "taking off"
+    HOLDING = "holding"  #: at altitude, in the firmware's own hold
+    ENGAGING = "engaging"  #: hold setpoints flow, offboard mode is asked for
+    ENGAGED = "engaged"  #: flies the caller's setpoints
+    LANDING = "landing"
+    LANDED = "landed"  #: on the ground, disarmed
+    FAILED = "failed"  #: gave up, for a reason
+    RELEASED = "released"  #: somebody else changed the mode; never fought
+    LOST = "lost"  #: no heartbeat
+
+
+class Signal(Enum):
+    """What moves a session."""
+
+    HEARTBEAT = "heartbeat"
+    STEPS_DONE = "steps done"
+    STEP_FAILED = "step failed"
+    TAKE_OFF = "order: take off"
+    ENGAGE = "order: engage"
+    LAND = "order: land"
+    MODE_TAKEN = "mode changed by another"
+    DISARMED = "disarmed"
+    LINK_LOST = "link lost"
+    LINK_BACK_IN_SET_UP = "link back, had been setting up"
+    LINK_BACK_IN_FLIGHT = "link back, had been flying"
+
+
+class Action(Enum):
+    """What a session does on the way; each is a method of that name, ``_identify`` and so on."""
+
+    IDENTIFY = "identify"
+    CONFIGURE = "configure"
+    LOCATE = "locate"
+    TAKE_OFF = "take_off"
+    ENGAGE = "engage"
+    LAND = "land"
+    REST = "rest"
+    FAIL = "fail"
+    RELEASE = "release"
+    SUSPEND = "suspend"
+    RESUME = "resume"
+
+
+class Transition(NamedTuple):
+    """An action, and the phase after it; None is the phase that the vehicle had when it was lost."""
+
+    action: Action
+    phase: Phase | None
+
+
+SET_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.READY)
+AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGING, Phase.ENGAGED)
+STEPPING = (
+    Phase.IDENTIFYING,
+    Phase.CONFIGURING,
+    Phase.POSITIONING,
+    Phase.TAKING_OFF,
+    Phase.ENGAGING,
+    Phase.LANDING,
+)
+
+Table = dict[tuple[Phase, Signal], Transition]
+
+
+def _table() -> Table:
+    """The rows one by one, then those that several phases share."""
+    table: Table = {
+        (Phase.CONNECTING, Signal.HEARTBEAT): Transition(Action.IDENTIFY, Phase.IDENTIFYING),
+        (Phase.IDENTIFYING, Signal.STEPS_DONE): Transition(Action.CONFIGURE, Phase.CONFIGURING),
+        (Phase.CONFIGURING, Signal.STEPS_DONE): Transition(Action.LOCATE, Phase.POSITIONING),
+        (Phase.POSITIONING, Signal.STEPS_DONE): Transition(Action.REST, Phase.READY),
+        (Phase.READY, Signal.TAKE_OFF): Transition(Action.TAKE_OFF, Phase.TAKING_OFF),
+        (Phase.TAKING_OFF, Signal.STEPS_DONE): Transition(Action.REST, Phase.HOLDING),
+        (Phase.HOLDING, Signal.ENGAGE): Transition(Action.ENGAGE, Phase.ENGAGING),
+        (Phase.ENGAGING, Signal.STEPS_DONE): Transition(Action.REST, Phase.ENGAGED),
+        (Phase.LANDING, Signal.STEPS_DONE): Transition(Action.REST, Phase.LANDED),
+        (Phase.LOST, Signal.LINK_BACK_IN_SET_UP): Transition(Action.IDENTIFY, Phase.IDENTIFYING),
+        (Phase.LOST, Signal.LINK_BACK_IN_FLIGHT): Transition(Action.RESUME, None),
+    }
+    shared: tuple[tuple[tuple[Phase, ...], Signal, Action, Phase], ...] = (
+        (STEPPING, Signal.STEP_FAILED, Action.FAIL, Phase.FAILED),
+        ((*AIRBORNE, Phase.FAILED), Signal.LAND, Action.LAND, Phase.LANDING),
+        (AIRBORNE, Signal.DISARMED, Action.FAIL, Phase.FAILED),
+        ((*AIRBORNE, Phase.LANDING), Signal.MODE_TAKEN, Action.RELEASE, Phase.RELEASED),
+        ((*SET_UP, *AIRBORNE, Phase.LANDING, Phase.RELEASED), Signal.LINK_LOST, Action.SUSPEND, Phase.LOST),
+    )
+    for phases, signal, action, then in shared:
+        table.update({(phase, signal): Transition(action, then) for phase in phases})
+    return table
+
+
+TABLE: Table = _table()
+
+
+def mermaid() -> str:
+    """The table as a Mermaid state diagram, one line a transition."""
+    lines = ["stateDiagram-v2", "    [*] --> CONNECTING"]
+    for (phase, signal), (action, then) in TABLE.items():
+        target = then.name if then else "the_phase_it_had"
+        lines.append(f"    {phase.name} --> {target}: {signal.value} / {action.value}")
+    return "\n".join(lines) + "\n"

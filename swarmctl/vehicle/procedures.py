@@ -1,0 +1,163 @@
+"""The steps of each phase, for any firmware: what its adapter says, in the order that all share.
+
+Nothing that telemetry can show is taken on the word of a COMMAND_ACK; message rates are the exception, and
+``positioning`` finds out whether those messages really come.
+"""
+
+from swarmctl.mavlink.dialect import mav
+
+from .autopilots.adapter import Adapter
+from .commands import disarm, message_interval, request_message
+from .settings import SessionSettings
+from .steps import Condition, OnFailure, Step
+from .telemetry import Telemetry
+
+ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
+IN_AIR: int = mav.MAV_LANDED_STATE_IN_AIR
+
+Steps = tuple[Step, ...]
+
+
+def wanted_rates(settings: SessionSettings) -> dict[int, float]:
+    """Message id → Hz of what the session reads, besides HEARTBEAT."""
+    return {
+        mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: settings.rate_hz,
+        mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: settings.status_rate_hz,
+        mav.MAVLINK_MSG_ID_SYS_STATUS: settings.status_rate_hz,
+    }
+
+
+def identifying(settings: SessionSettings) -> Steps:
+    """The firmware's version, if it says."""
+    return (
+        Step(
+            "version",
+            settings.command_patience_s,
+            command=request_message(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION),
+            confirmed=lambda t: t.version is not None,
+            on_failure=OnFailure.WARN,
+        ),
+    )
+
+
+def configuring(adapter: Adapter, settings: SessionSettings) -> Steps:
+    """The rates of what is read; off with what is not: a firmware refuses that for messages it lacks."""
+    patience = settings.command_patience_s
+    rates = wanted_rates(settings)
+    wanted = [Step("message rates", patience, command=message_interval(i, hz)) for i, hz in rates.items()]
+    unwanted = [
+        Step("message rates", patience, command=message_interval(i, 0.0), on_failure=OnFailure.IGNORE)
+        for i in adapter.unwanted_messages
+    ]
+    return (*wanted, *unwanted)
+
+
+def positioning(settings: SessionSettings) -> Steps:
+    """Every message that flight needs has come, and the vehicle stands on the ground, ready to arm."""
+    return (
+        _streamed("position", mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, settings, lambda t: t.positioned),
+        _streamed("standing", mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, settings, _stands),
+        _streamed("system status", mav.MAVLINK_MSG_ID_SYS_STATUS, settings, lambda t: t.status_received),
+        _requested("origin", mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, settings, lambda t: t.origin is not None),
+        _requested("home", mav.MAVLINK_MSG_ID_HOME_POSITION, settings, lambda t: t.home is not None),
+        Step("ready to arm", settings.ready_patience_s, confirmed=lambda t: t.healthy and not t.armed),
+    )
+
+
+def _stands(telemetry: Telemetry) -> bool:
+    """On the ground, by the vehicle's own word."""
+    return telemetry.landed_state == ON_GROUND
+
+
+def _streamed(name: str, message_id: int, settings: SessionSettings, confirmed: Condition) -> Step:
+    """A message that should come by itself; its rate is asked for again when it does not."""
+    command = message_interval(message_id, wanted_rates(settings)[message_id])
+    patience = settings.ready_patience_s
+    wait = settings.confirm_timeout_s
+    return Step(name, patience, command=command, confirmed=confirmed, wait_s=wait, insists=True)
+
+
+def _requested(name: str, message_id: int, settings: SessionSettings, confirmed: Condition) -> Step:
+    """A message that comes when asked for, but only once the vehicle knows its content."""
+    command = request_message(message_id)
+    return Step(name, settings.ready_patience_s, command=command, confirmed=confirmed, insists=True)
+
+
+def taking_off(adapter: Adapter, telemetry: Telemetry, altitude_m: float, settings: SessionSettings) -> Steps:
+    """The firmware's own order, then the climb.
+
+    The climb is judged by altitude above sea level: home, and with it the height above home, may be set
+    anew when the vehicle is armed.  Raises ``ValueError`` while the home position is unknown.
+    """
+    if telemetry.home is None:
+        raise ValueError("take-off needs the home position")
+    altitude_amsl_m = telemetry.home.alt_amsl_m + altitude_m
+
+    def reached(t: Telemetry) -> bool:
+        return (
+            t.landed_state == IN_AIR
+            and abs(t.altitude_amsl_m - altitude_amsl_m) <= settings.altitude_tolerance_m
+            and abs(t.v_up) <= settings.climb_tolerance_mps
+        )
+
+    climb_s = altitude_m / settings.slowest_climb_mps / settings.time_scale
+    modes = frozenset((adapter.modes.take_off, adapter.modes.hold))
+    climb = Step("take-off altitude", settings.climb_patience_s + climb_s, confirmed=reached, modes=modes)
+    return (*adapter.take_off(telemetry, altitude_m, settings), climb)
+
+
+def engaging(adapter: Adapter, settings: SessionSettings) -> Steps:
+    """Hold setpoints flow for a while, then the mode is changed."""
+    modes = adapter.modes
+    ours = frozenset((modes.take_off, modes.hold, modes.engaged))
+    return (
+        Step("setpoint stream", settings.command_patience_s, wait_s=settings.stream_s, modes=ours),
+        Step(
+            "offboard control",
+            settings.command_patience_s,
+            command=adapter.set_mode(modes.engaged),
+            confirmed=lambda t: t.mode == modes.engaged,
+            modes=ours,
+        ),
+    )
+
+
+def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings) -> Steps:
+    """Land here, disarm if the firmware does not, and leave a mode from which arming is harmless.
+
+    On disarming, PX4 falls back to an earlier mode; were that offboard, a vehicle that is armed while
+    setpoints flow would fly.  The land mode is asked for even of a vehicle that stands disarmed: an ARM may
+    still be on its way.
+    """
+    modes = adapter.modes
+    patience = settings.command_patience_s
+    descent_s = max(telemetry.height_m, 0.0) / settings.slowest_descent_mps / settings.time_scale
+    return (
+        Step(
+            "land mode",
+            patience,
+            command=adapter.set_mode(modes.land),
+            confirmed=lambda t: t.mode == modes.land,
+        ),
+        Step(
+            "touch-down",
+            settings.landing_patience_s + descent_s,
+            confirmed=_stands,
+            modes=frozenset((modes.land,)),
+        ),
+        Step(
+            "disarming",
+            patience,
+            command=disarm(),
+            confirmed=lambda t: not t.armed,
+            wait_s=settings.disarm_after_s,
+            insists=True,
+        ),
+        Step(
+            "hold mode after landing",
+            patience,
+            command=adapter.set_mode(modes.hold),
+            confirmed=lambda t: t.mode == modes.hold,
+            on_failure=OnFailure.WARN,
+        ),
+    )

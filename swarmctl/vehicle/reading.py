@@ -1,0 +1,71 @@
+"""From the messages that every firmware sends alike to telemetry: units, signs and axes."""
+
+from collections.abc import Callable
+from typing import Any
+
+from swarmctl.mavlink.dialect import mav
+
+from .telemetry import GeoPoint, Telemetry
+
+
+def read_position(telemetry: Telemetry, fields: Any, now: float) -> None:
+    """GLOBAL_POSITION_INT: mm, and cm/s north, east, down.  0, 0 is what some firmwares say before a fix."""
+    if fields.lat == 0 and fields.lon == 0:
+        return
+    telemetry.lat_e7 = fields.lat
+    telemetry.lon_e7 = fields.lon
+    telemetry.altitude_amsl_m = fields.alt / 1000.0
+    telemetry.height_m = fields.relative_alt / 1000.0
+    telemetry.v_north = fields.vx / 100.0
+    telemetry.v_east = fields.vy / 100.0
+    telemetry.v_up = -fields.vz / 100.0
+    telemetry.boot_ms = fields.time_boot_ms
+    telemetry.received_at = now
+
+
+def read_heartbeat(telemetry: Telemetry, fields: Any) -> None:
+    """HEARTBEAT: mode and arming."""
+    telemetry.mode = fields.custom_mode
+    telemetry.armed = bool(fields.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED)
+
+
+def read_landed_state(telemetry: Telemetry, fields: Any) -> None:
+    """EXTENDED_SYS_STATE."""
+    telemetry.landed_state = fields.landed_state
+
+
+def read_status(telemetry: Telemetry, fields: Any) -> None:
+    """SYS_STATUS: the battery, which is -1 while the vehicle does not know."""
+    percent = fields.battery_remaining
+    telemetry.battery_percent = percent if percent >= 0 else None
+    telemetry.status_received = True
+
+
+def read_home(telemetry: Telemetry, fields: Any) -> None:
+    """HOME_POSITION: degrees × 1e7 and mm."""
+    telemetry.home = _geo_point(fields)
+
+
+def read_origin(telemetry: Telemetry, fields: Any) -> None:
+    """GPS_GLOBAL_ORIGIN: degrees × 1e7 and mm."""
+    telemetry.origin = _geo_point(fields)
+
+
+def read_version(telemetry: Telemetry, fields: Any) -> None:
+    """AUTOPILOT_VERSION: a byte each of major, minor and patch, above one for the release type."""
+    word = fields.flight_sw_version
+    telemetry.version = f"{word >> 24 & 0xFF}.{word >> 16 & 0xFF}.{word >> 8 & 0xFF}"
+
+
+def _geo_point(fields: Any) -> GeoPoint:
+    return GeoPoint(fields.latitude / 1e7, fields.longitude / 1e7, fields.altitude / 1000.0)
+
+
+READERS: dict[int, Callable[[Telemetry, Any], None]] = {
+    mav.MAVLINK_MSG_ID_HEARTBEAT: read_heartbeat,
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: read_landed_state,
+    mav.MAVLINK_MSG_ID_SYS_STATUS: read_status,
+    mav.MAVLINK_MSG_ID_HOME_POSITION: read_home,
+    mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: read_origin,
+    mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: read_version,
+}

@@ -1,0 +1,155 @@
+"""A ground station of a few lines: raw frames to and from a stub fleet, in virtual time."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from sim_vehicle_stub.fleet import StubFleet
+from sim_vehicle_stub.pilot import Limits
+from swarmctl.mavlink.codec import Decoder, Encoder, Frame
+from swarmctl.mavlink.dialect import mav
+
+ORIGIN = (47.3977, 8.5456, 488.0)
+Z_AND_VELOCITY = 1 | 2 | 32 | 64 | 128 | 256 | 2048
+
+
+class Station:
+    """Drives a fleet tick by tick and remembers every frame of its first vehicle with the time it came."""
+
+    def __init__(self, pads: list[tuple[float, float]], limits: Limits, tick_s: float, hello: bool) -> None:
+        self.fleet = StubFleet(len(pads), origin=ORIGIN, pads_m=pads, limits=limits)
+        self.vehicle = self.fleet.vehicles[0]
+        self.encoder = Encoder(255, 190)
+        self.decoder = Decoder()
+        self.heard: list[tuple[float, Frame]] = []
+        self.now = 0.0
+        self.tick_s = tick_s
+        self._ticks = 0
+        self.fleet.advance(0.0)
+        if hello:
+            self.send(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+        self.listen()
+
+    def send(self, message: Any) -> None:
+        self.send_raw(self.encoder.encode(message))
+
+    def send_raw(self, data: bytes) -> None:
+        self.vehicle.receive(data, self.now)
+        self.listen()
+
+    def listen(self) -> None:
+        for raw in self.vehicle.outgoing():
+            frames = self.decoder.feed(raw)
+            assert len(frames) == 1, "one frame is one datagram"
+            self.heard += [(self.now, frame) for frame in frames]
+
+    def tick(self) -> None:
+        self._ticks += 1
+        self.now = round(self._ticks * self.tick_s, 6)
+        self.fleet.advance(self.now)
+        self.listen()
+
+    def run(self, seconds: float, each: Callable[[], None] | None = None, every: float = 0.1) -> None:
+        """Let time pass; ``each`` is called ``every`` so many seconds."""
+        end = self.now + seconds - 1e-9
+        due = self.now
+        while self.now < end:
+            if each and self.now >= due - 1e-9:
+                each()
+                due += every
+            self.tick()
+
+    def run_until(
+        self, condition: Callable[[], bool], limit: float, each: Callable[[], None] | None = None
+    ) -> float:
+        """Let time pass until ``condition``; the seconds it took."""
+        start = self.now
+        while not condition():
+            assert self.now - start < limit, "it never happened"
+            if each:
+                each()
+            self.tick()
+        return self.now - start
+
+    def command(self, number: int, *parameters: float, target: int = 1) -> list[int]:
+        """Send a COMMAND_LONG; the results acknowledged at once."""
+        filled = [*parameters, *[math.nan] * (7 - len(parameters))]
+        before = len(self.heard)
+        self.send(mav.MAVLink_command_long_message(target, 1, number, 0, *filled))
+        return [
+            f.fields.result
+            for _, f in self.heard[before:]
+            if f.message_id == 77 and f.fields.command == number
+        ]
+
+    def set_mode(self, mode: int) -> list[int]:
+        return self.command(mav.MAV_CMD_DO_SET_MODE, 1, mode >> 16 & 0xFF, mode >> 24)
+
+    def arm(self) -> list[int]:
+        return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def setpoint(
+        self,
+        v_north: float = 0.0,
+        v_east: float = 0.0,
+        z: float = 0.0,
+        *,
+        mask: int = Z_AND_VELOCITY,
+        frame: int = 1,
+        xy: tuple[float, float] = (0.0, 0.0),
+        vz: float = 0.0,
+        yaw: float = 0.0,
+    ) -> None:
+        self.send_raw(
+            self.encoder.set_position_target_local_ned(
+                0, 1, 1, frame, mask, xy[0], xy[1], z, v_north, v_east, vz, 0.0, 0.0, 0.0, yaw, 0.0
+            )
+        )
+
+    def all(self, message_id: int) -> list[tuple[float, Any]]:
+        return [(time, frame.fields) for time, frame in self.heard if frame.message_id == message_id]
+
+    def last(self, message_id: int) -> Any:
+        return self.all(message_id)[-1][1]
+
+    def texts(self) -> list[str]:
+        return [fields.text for _, fields in self.all(253)]
+
+    @property
+    def mode(self) -> int:
+        return self.vehicle.personality.custom_mode
+
+    @property
+    def body(self) -> Any:
+        return self.fleet.truth[0]
+
+    def fly_up(self, height: float) -> None:
+        """Boot, take off, loiter."""
+        self.run(5.0)
+        assert self.command(mav.MAV_CMD_NAV_TAKEOFF, *[math.nan] * 6, ORIGIN[2] + height) == [0]
+        assert self.arm() == [0]
+        self.run_until(lambda: self.mode == 0x3040000, 60.0)
+        self.run(5.0)
+
+    def fly_offboard(self, height: float) -> None:
+        """Take off and switch to OFFBOARD, standing still."""
+        self.fly_up(height)
+        self.run(0.5, lambda: self.setpoint(z=-height))
+        assert self.set_mode(0x60000) == [0, 0]
+
+
+@pytest.fixture
+def station() -> Callable[..., Station]:
+    """Make a station; one vehicle at the origin unless told otherwise."""
+
+    def make(
+        pads: list[tuple[float, float]] | None = None,
+        limits: Limits | None = None,
+        tick_s: float = 0.1,
+        hello: bool = True,
+    ) -> Station:
+        return Station(pads or [(0.0, 0.0)], limits or Limits(), tick_s, hello)
+
+    return make
