@@ -19,6 +19,7 @@ from .swarm import Swarm
 from .track import Track
 
 DONE, BROKEN, REFUSED, ABORTED = 0, 1, 3, 4
+STANDING_MPS = 0.5
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,7 @@ class Outcome:
             "detected_fraction": round(detected / targets, 6) if targets else 0.0,
             "time_to_s": summary.time_to(found),
             "mean_targets_in_range": round(self.swarm.in_range_total / samples, 4) if samples else 0.0,
+            "standing_fraction": self.standing_fraction(),
             "min_separation_m": self.min_separation_m(),
             "geofence_violations": self.geofence_violations(),
             "setpoints_sent": sum(s.setpoints_sent for s in statistics),
@@ -97,6 +99,16 @@ class Outcome:
             track.field("east"), track.field("north"), track.field("up"), track.airborne
         )
         return None if nearest is None else round(nearest, 3)
+
+    def standing_fraction(self) -> float:
+        """The share of the search's vehicle-ticks in which a vehicle truly stood still."""
+        began = self.swarm.search_began
+        if began is None:
+            return 0.0
+        times = self.track.times_s
+        during = (times >= began) & (times < began + self.searched_s)
+        v_east, v_north = self.track.field("v_east")[during], self.track.field("v_north")[during]
+        return round(float(np.mean(np.hypot(v_east, v_north) < STANDING_MPS)), 6) if v_east.size else 0.0
 
     def geofence_violations(self) -> int:
         """Vehicles × ticks with the true position outside the border or inside a keep-out."""

@@ -145,9 +145,8 @@ class Swarm:
                     session.engage()
             if active and all(session.phase is Phase.ENGAGED for session in active):
                 self._begin_search(k, now)
-        elif self.part is Part.RETURNING and not any(s.phase in FLYING for s in self._sessions):
-            self.part = Part.OVER
-        elif self.part is not Part.OVER and not active:
+        landed = self.part is Part.RETURNING and not any(s.phase in FLYING for s in self._sessions)
+        if landed or not active:
             self.part = Part.OVER
 
     def _take_off(self, now: float) -> None:

@@ -59,7 +59,8 @@ class Document:
             path = path[:-1]
         mark = self.marks.get(path, Mark(None, None))
         if mark.typed is not None:
-            return Problem(COMMAND_LINE, None, None, mark.typed, finding.message, finding.hint)
+            key = key_of((mark.typed, *finding.path[len(path) :]))
+            return Problem(COMMAND_LINE, None, None, key, finding.message, finding.hint)
         return Problem(self.file, mark.line, mark.column, key_of(finding.path), finding.message, finding.hint)
 
 
@@ -187,7 +188,7 @@ def _text(content: bytes, file: str) -> str:
         message = f"{len(content)} bytes is too large for a mission"
         raise MissionError([Problem(file, None, None, "", message, f"at most {MAX_BYTES}")])
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
         before = content[: error.start]
         line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")

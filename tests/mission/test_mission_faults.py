@@ -87,6 +87,7 @@ Complaints = Callable[..., list[str]]
             "m.yaml:1:33: planner.parameters.belief.then: must be text, not 3",
         ),
         ("dynamics: rocket", "m.yaml:1:1: dynamics: must be 'ideal' or 'multicopter', not 'rocket'"),
+        ("duration_s: !!binary aGVsbG8=", "m.yaml:1:13: duration_s: the tag"),
         ("- 1", "m.yaml:1:1: must be a mapping of keys, not [1]"),
         ("hello", "m.yaml:1:1: must be a mapping of keys, not 'hello'"),
     ],

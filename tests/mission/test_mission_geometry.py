@@ -123,6 +123,8 @@ def test_pads_find_the_south_western_most_place_of_a_polygon() -> None:
     assert shapely.covers(found.legal, shapely.points(places)).all()
     assert places[0].sum() < 1000 + 20 * math.sqrt(2) + 20
     assert np.array_equal(places - places[0], [[0, 0], [20, 0], [0, 20], [20, 20]])
+    slanted = Area(polygon_m=((0.0, 300.0), (1000.0, 0.0), (1000.0, 1000.0), (0.0, 1000.0)))
+    assert pads.corner_pads(regions(Mission(area=slanted)), 1, 20.0, 20.0)[0].sum() < 400
     around = Mission(area=triangle, keep_out=(KeepOut(box_m=(0.0, 900.0, 0.0, 1000.0)),))
     assert pads.corner_pads(regions(around), 4, 20.0, 20.0)[:, 0].min() > 920
 

@@ -108,7 +108,7 @@ def test_a_mission_cannot_be_changed(read: Read) -> None:
 
 
 def test_settings_replace_what_the_file_says(read: Read) -> None:
-    settings = {"vehicles.count": 3, "planner.algorithm": "mdc", "planner.inertia": 0.2, "radio.loss": 0.5}
+    settings = {"vehicles.count": 3, "planner.inertia": 0.2, "planner.algorithm": "mdc", "radio.loss": 0.5}
     mission = read("vehicles: {count: 9, speed_mps: 7}\nplanner: {algorithm: fco}", settings)
     assert mission.vehicles == VehicleGroup(count=3, speed_mps=7)
     assert mission.planner.parameters == {"mdc": {"inertia": 0.2}}
@@ -162,6 +162,12 @@ def test_settings_reach_into_lists(read: Read) -> None:
         ),
         ("name: x", "name.first", "y", "name.first: cannot be set: there are no keys below 'x'"),
         ("{}", "", 1, "unknown key"),
+        (
+            "keep_out: [{box_m: [1, 2, 3, 4]}]",
+            "keep_out",
+            [{"box_m": [2, 1, 3, 4]}],
+            "keep_out[0].box_m: the order",
+        ),
     ],
 )
 def test_a_wrong_setting_names_the_command_line(

@@ -1,0 +1,5 @@
+"""``python -m swarmctl`` is ``swarmctl``."""
+
+from .cli import main
+
+main()
