@@ -1,4 +1,4 @@
-"""Stub vehicles that are what a mission says its vehicles are: speed, acceleration, climb, pads, endurance."""
+"""Stub vehicles that are what a mission says they are: speed, acceleration, climb, pads, endurance."""
 
 from collections.abc import Sequence
 

@@ -11,11 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmctl.core.geodesy import to_geodetic
+from swarmctl.core.bind import compiled
+from swarmctl.core.calls import to_geodetic
 
 from . import bodies
 from .pilot import Limits, Pilot
 from .vehicle import StubVehicle
+
+move = compiled(bodies.move)
+read_sensors = compiled(bodies.read_sensors)
 
 STEP_S = 0.02
 STEP_TOLERANCE = 1e-6
@@ -58,6 +62,7 @@ class StubFleet:
         self._step_s = step_s
         self._steps = 0
         self.vehicles = [self._vehicle(index, autopilot, each[index]) for index in range(count)]
+        move(self.truth, self._commands, self._limits, 0, step_s)  # compiled here, not in the first tick
         self._tell_bodies()
 
     def _vehicle(self, index: int, autopilot: str, limits: Limits) -> StubVehicle:
@@ -70,7 +75,7 @@ class StubFleet:
     def advance(self, now: float) -> None:
         """Move every body on to ``now`` (seconds, never backwards), then let every vehicle act and send."""
         steps = max(0, int((now - self._boot) / self._step_s + STEP_TOLERANCE) - self._steps)
-        bodies.move(self.truth, self._commands, self._limits, steps, self._step_s)
+        move(self.truth, self._commands, self._limits, steps, self._step_s)
         self._steps += steps
         self._tell_bodies()
         for vehicle in self.vehicles:
@@ -78,7 +83,7 @@ class StubFleet:
 
     def _tell_bodies(self) -> None:
         """Give every vehicle its place and motion, true and as its sensors read them."""
-        bodies.read_sensors(self.truth, self._wire, *self._origin)
+        read_sensors(self.truth, self._wire, *self._origin)
         boot_ms = round(self._steps * self._step_s * 1000.0)
         rows: Any = self._rows.tolist()
         wires: Any = self._wire.tolist()

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from swarmctl.core.geodesy import to_local
+from swarmctl.core.calls import to_local
 from swarmctl.mavlink.dialect import mav
 
 from ..commands import Command, whole

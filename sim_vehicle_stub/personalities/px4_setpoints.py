@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from swarmctl.core.geodesy import to_local
+from swarmctl.core.calls import to_local
 from swarmctl.mavlink.dialect import mav
 
 from .projection import reproject

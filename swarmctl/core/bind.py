@@ -15,19 +15,15 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import FunctionType, SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 
-from . import loop, planners, scene, steering, wire
+from . import loop, planners
 
+F = TypeVar("F", bound=Callable[..., object])
 BOUND = ("prepare", "observe", "share", "deliver", "decide", "period", "run_ideal", "run_multicopter")
-PLAIN = {
-    steering: ("begin_return", "steer"),
-    wire: ("read_poses",),
-    scene: ("place_centres", "lay_out", "sort_into"),
-}
 _NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
 
 
@@ -83,26 +79,14 @@ def bind(name: str) -> SimpleNamespace:
     free: dict[str, Any] = {"start": module.start, "tell": module.tell, "plan": module.step}
     for entry in BOUND:
         free[entry] = _compile(getattr(loop, entry), f"{entry}_{name.replace('-', '_')}", free)
-    free.update(plain())
     return SimpleNamespace(memory_dtype=module.MEMORY, **free)
 
 
-@cache
-def plain() -> dict[str, Any]:
-    """The entry points that are the same for every planner."""
-    _use_cache()
-    free: dict[str, Any] = {}
-    for module, entries in PLAIN.items():
-        for entry in entries:
-            free[entry] = compiled(getattr(module, entry))
-    return free
-
-
-def compiled(kernel: Callable[..., Any]) -> Any:
+def compiled(kernel: F) -> F:
     """The cached entry point for one kernel, this package's or another's.
 
     A kernel from outside this package may only call this package and its own file, whose time stamp Numba's
     cache goes by.
     """
     _use_cache()
-    return _compile(getattr(kernel, "py_func", kernel), kernel.__name__, {})
+    return cast(F, _compile(getattr(kernel, "py_func", kernel), kernel.__name__, {}))

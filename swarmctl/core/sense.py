@@ -45,7 +45,8 @@ def sense(
 ) -> int:  # fmt: skip
     """Write what vehicle ``i`` sees at ``tick`` into ``reports[i]`` and return how many they are.
 
-    ``alarms`` (V,) counts its false alarms, which numbers them; ``found`` (T,) keeps the first tick at which any vehicle reported the target (-1: not yet).
+    ``alarms`` (V,) counts its false alarms, which numbers them; ``found`` (T,) keeps the first tick at
+    which any vehicle reported the target (-1: not yet).
     """
     seed = rules[0].seed
     reach = fleet[i].sensor_range

@@ -101,10 +101,10 @@ def release(errands: Records) -> bool:
 @kernel
 def all_landed(errands: Records) -> bool:
     """Whether every vehicle's flight is over."""
+    landed = 0
     for i in range(errands.shape[0]):
-        if errands[i].stage != stages.LANDED:
-            return False
-    return True
+        landed += 1 if errands[i].stage == stages.LANDED else 0
+    return bool(landed == errands.shape[0])
 
 
 @kernel

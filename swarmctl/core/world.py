@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from . import bind, planners, state
+from . import bind, calls, planners, state
 from .arrays import Flags, Floats, Integers, Records
 
 
@@ -38,8 +38,7 @@ def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander
     grid[0] = (low[0], low[1], cell, columns, rows, wander_m, wander_mps)
     targets = np.zeros(len(places), state.TARGET)
     starts = np.zeros(columns * rows + 1, np.int64)
-    kernels = bind.plain()
-    kernels["sort_into"](grid, np.ascontiguousarray(places), clusters, targets, starts)
+    calls.sort_into(grid, np.ascontiguousarray(places), clusters, targets, starts)
     return Scene(targets, grid, starts)
 
 
@@ -132,7 +131,7 @@ class World:
 
     def begin_return(self, now: float) -> None:
         """Send home every vehicle with a one in ``orders``, and clear them."""
-        self.kernels.begin_return(
+        calls.begin_return(
             self.fleet, self.poses, self.errands, self.orders, now, self.rules, self.fences.plan,
             self.fences.guard,
         )  # fmt: skip
@@ -140,7 +139,7 @@ class World:
 
     def steer(self, now: float) -> None:
         """Homing and guard: this setpoint tick's ``setpoints``."""
-        self.kernels.steer(
+        calls.steer(
             self.fleet, self.poses, self.errands, self.wishes, now, self.rules, self.fences.plan,
             self.fences.guard, self.paths, self.wants, self.setpoints,
         )  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from swarmctl import __version__
-from swarmctl.core import bind
+from swarmctl.core import bind, calls
 from swarmctl.core.world import World
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
@@ -53,7 +53,7 @@ def warm_up(mission: Mission, algorithm: str) -> bool:
     world.orders[:] = 1
     world.begin_return(0.0)
     world.steer(0.0)
-    bind.plain()["read_poses"](np.zeros((len(world.fleet), 6)), world.poses, 0.0, 0.0, 0.0)
+    calls.read_poses(np.zeros((len(world.fleet), 6)), world.poses, 0.0, 0.0, 0.0)
     return first_time
 
 

@@ -10,7 +10,7 @@ from enum import Enum
 
 import numpy as np
 
-from swarmctl.core import bind, stages
+from swarmctl.core import calls, stages
 from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
@@ -63,7 +63,6 @@ class Swarm:
         self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
         origin = mission.origin
         self._origin = (origin.lat, origin.lon, origin.alt_m)
-        self._read_poses = bind.plain()["read_poses"]
         self._wire = np.zeros((len(sessions), 6))
         self._period = round(mission.planner.period_s * mission.setpoints.rate_hz)
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
@@ -132,7 +131,7 @@ class Swarm:
         for i, session in enumerate(self._sessions):
             t = session.telemetry
             self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up)
-        self._read_poses(self._wire, self._world.poses, *self._origin)
+        calls.read_poses(self._wire, self._world.poses, *self._origin)
 
     def _go_on(self, k: int, now: float) -> None:
         """Move on to the next part of the flight when everybody is ready for it."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
-from swarmctl.core.geodesy import to_local
+from swarmctl.core.calls import to_local
 
 from .model import Circle, KeepOut, Mission, Origin, PolygonDegrees
 

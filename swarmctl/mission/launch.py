@@ -12,7 +12,8 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 from swarmctl.core.arrays import Floats
-from swarmctl.core.randoms import LAUNCH, uniform
+from swarmctl.core.calls import uniform
+from swarmctl.core.randoms import LAUNCH
 
 from .geometry import Regions
 from .model import Mission

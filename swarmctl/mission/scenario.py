@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from swarmctl.core import bind, state
+from swarmctl.core import calls, state
 from swarmctl.core.arrays import Floats, Records
 from swarmctl.core.world import Fences, Scene, World, make_scene, make_settings
 
@@ -108,14 +108,14 @@ class Scenario:
         return places, np.zeros(len(places), np.int64)
 
     def _drawn(self, seed: int) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
-        wanted, kernels = self.mission.targets, bind.plain()
+        wanted = self.mission.targets
         low, high = self.regions.border.min(axis=0), self.regions.border.max(axis=0)
         # Centres lie a radius inside the area where it is wide enough, so that clusters are not cut in half.
         inset = np.minimum(wanted.radius_m, (high - low) / 4.0)
         box = np.array([low[0] + inset[0], high[0] - inset[0], low[1] + inset[1], high[1] - inset[1]])
         centres = np.zeros((wanted.clusters, 2))
         places, clusters = np.zeros((wanted.count, 2)), np.zeros(wanted.count, np.int64)
-        kernels["place_centres"](
+        calls.place_centres(
             seed,
             wanted.clusters,
             wanted.radius_m,
@@ -124,7 +124,7 @@ class Scenario:
             np.ascontiguousarray(self.starts),
             centres,
         )
-        kernels["lay_out"](
+        calls.lay_out(
             seed, wanted.radius_m, wanted.hot_spot_share, self.regions.raw, centres,
             np.zeros(wanted.clusters), np.zeros(wanted.clusters, np.int64), places, clusters,
         )  # fmt: skip

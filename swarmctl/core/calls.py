@@ -1,0 +1,17 @@
+"""Kernels that Python calls by themselves, compiled once and cached; those of the loop are bound in bind.py.
+
+Calling a kernel of the other modules directly would compile it anew in every process.
+"""
+
+from . import geodesy, randoms, scene, steering, wire
+from .bind import compiled
+
+to_local = compiled(geodesy.to_local)
+to_geodetic = compiled(geodesy.to_geodetic)
+uniform = compiled(randoms.uniform)
+place_centres = compiled(scene.place_centres)
+lay_out = compiled(scene.lay_out)
+sort_into = compiled(scene.sort_into)
+begin_return = compiled(steering.begin_return)
+steer = compiled(steering.steer)
+read_poses = compiled(wire.read_poses)
