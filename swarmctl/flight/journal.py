@@ -10,10 +10,11 @@ from swarmctl.record.folder import RunFolder
 from swarmctl.record.mcap_log import Channel, McapLog
 from swarmctl.record.tlog import TlogWriter
 
-from . import clock
+FLUSH_S = 30.0
+"""Flight time between two flushes, a fraction of a second of the wall's in lockstep: all that a crash can take.
 
-FLUSH_S = 1.0
-"""At the most so much of a flight, by the wall's clock, is lost in a crash."""
+By flight time, so that the same flight writes the same bytes.
+"""
 
 
 class Journal:
@@ -24,7 +25,7 @@ class Journal:
         self._log = McapLog(folder.mcap)
         self._tlog = TlogWriter(folder.tlog)
         self._tick_rows = np.zeros(len(world.fleet), rows.TICK)
-        self._flushed = clock.wall_s()
+        self._flushed = 0.0
         self._log.attach("mission.yaml", mission_text)
         self._log.metadata("flight", about)
         once = (
@@ -74,11 +75,10 @@ class Journal:
             "/events", now, {"time_s": round(now, 3), "vehicle": vehicle, "kind": kind, "text": text}
         )
 
-    def breathe(self) -> None:
-        """Give what is older than a second, by the wall, to the operating system."""
-        wall = clock.wall_s()
-        if wall - self._flushed >= FLUSH_S:
-            self._flushed = wall
+    def breathe(self, now: float) -> None:
+        """Now and then give what was written to the operating system."""
+        if now - self._flushed >= FLUSH_S:
+            self._flushed = now
             self._log.flush()
             self._tlog.flush()
 

@@ -78,7 +78,7 @@ class Lockstep:
                     vehicle.receive(datagram, now)
                 self._journal.frames(now, session.traffic())
             self._track.add(now, self._vehicles.truth)
-            self._journal.breathe()
+            self._journal.breathe(now)
             each_tick(now)
             if self._swarm.part is Part.OVER:
                 return

@@ -43,10 +43,14 @@ class Scenario:
         """Where each vehicle starts, (V, 2)."""
         if self.ideal:
             return np.tile(launch.ideal_start(self.regions), (len(self.mission.fleet), 1))
-        found = self._stands if self._stands is not None else pads.launch_pads(self.mission)
-        if found is None:
-            raise ValueError("launch: as_found needs the places where the vehicles were found")
-        return found
+        if self._stands is not None:
+            return self._stands
+        named = pads.launch_pads(self.mission)
+        if named is not None:
+            return named
+        # As found, but nobody was looked for: stubs stand where a corner launch would put them.
+        count, margin = len(self.mission.fleet), self.mission.safety.fence_margin_m
+        return pads.corner_pads(self.regions, count, self.mission.spacing_m, margin)
 
     @cached_property
     def fences(self) -> Fences:
