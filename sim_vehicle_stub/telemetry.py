@@ -53,10 +53,8 @@ def sys_status(vehicle: "StubVehicle") -> bytes:
     health = SENSORS if vehicle.located else SENSORS & ~mav.MAV_SYS_STATUS_SENSOR_GPS
     if vehicle.personality.ready:
         health |= PREARM
-    return vehicle.encode(
-        mav.MAVLink_sys_status_message(
-            SENSORS, SENSORS, health, 300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0
-        )
+    return vehicle.encoder.sys_status(
+        SENSORS, SENSORS, health, 300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0
     )
 
 
@@ -97,7 +95,7 @@ def attitude(vehicle: "StubVehicle") -> bytes:
 
 def extended_sys_state(vehicle: "StubVehicle") -> bytes:
     """EXTENDED_SYS_STATE."""
-    return vehicle.encode(mav.MAVLink_extended_sys_state_message(0, vehicle.personality.landed_state))
+    return vehicle.encoder.extended_sys_state(0, vehicle.personality.landed_state)
 
 
 def home_position(vehicle: "StubVehicle") -> bytes | None:

@@ -183,12 +183,8 @@ class StubVehicle:
         if on_link is None:
             self.personality.command(command)
             return
-        waiting = len(self._outbox)
-        result = on_link(self, command)
-        asked_for = self._outbox[waiting:]
-        del self._outbox[waiting:]
-        self.answer(command, result)
-        self._outbox += asked_for
+        # A message that is asked for comes before the ACK, as PX4 sends it.
+        self.answer(command, on_link(self, command))
 
     def _parameter_read(self, frame: Frame) -> None:
         fields = frame.fields

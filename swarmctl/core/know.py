@@ -36,11 +36,13 @@ def learn_seen(
 
 
 @kernel
-def announce(beacons: Records, slot: int, i: int, poses: Records, knowledge: Records, limit: int) -> None:
+def announce(beacons: Records, slot: int, i: int, fleet: Records, poses: Records, knowledge: Records) -> None:
     """Fill the part of vehicle ``i``'s beacon that no planner decides: where it is and which contacts it sends.
 
-    ``limit`` contacts fit a beacon (negative: all); where they do not, the window moves round the list.
+    A vehicle's ``beacon_contacts`` fit its beacon (negative: all); where the list is longer, a window of it
+    moves on from beacon to beacon.
     """
+    limit = fleet[i].beacon_contacts
     beacons[slot, i].east = poses[i].east
     beacons[slot, i].north = poses[i].north
     beacons[slot, i].v_east = poses[i].v_east

@@ -43,13 +43,13 @@ def observe(
 
 
 def share(
-    memory: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags, reports: Records,
-    report_count: Integers, beacons: Records, slot: int, rules: Records,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    reports: Records, report_count: Integers, beacons: Records, slot: int,
 ) -> None:  # fmt: skip
     """Know, first half: learn what the own sensor reported, and make the beacon."""
     for i in range(poses.shape[0]):
         know.learn_seen(knowledge, i, contacts, has, reports, report_count[i])
-        know.announce(beacons, slot, i, poses, knowledge, rules[0].beacon_contacts)
+        know.announce(beacons, slot, i, fleet, poses, knowledge)
         tell(memory, i, beacons, slot)
 
 
@@ -93,7 +93,7 @@ def period(
     slot = tick % depth
     arriving = (tick + depth - rules[0].radio_delay) % depth
     observe(fleet, poses, targets, grid, starts, alarms, rules, tick, reports, report_count, found)
-    share(memory, poses, knowledge, contacts, has, reports, report_count, beacons, slot, rules)
+    share(memory, fleet, poses, knowledge, contacts, has, reports, report_count, beacons, slot)
     deliver(fleet, poses, rules, tick, slot, heard, heard_count)
     decide(
         memory, fleet, poses, knowledge, contacts, has, told, beacons, heard, heard_count, arriving, edges,

@@ -25,13 +25,15 @@ VEHICLE = record(
     "speed", "acceleration", "braking", "lag", "latency", "climb", "descent", "climb_acceleration",
     "altitude", "pad_east", "pad_north", "heading_east", "heading_north",
     "sensor_range", "detection_probability", "alarms_per_second", "position_noise", "radio_range", "radio_loss",
+    "beacon_contacts",
+    integers=("beacon_contacts",),
 )  # fmt: skip
 
 # What holds for the whole run.  `reach` fields are how far ahead a planner looks for the fence.
 RULES = record(
     "seed", "period", "interval", "separation", "duration", "metric", "ideal", "radio_delay",
-    "beacon_contacts", "alarm_slots", "targets", "landing_speed",
-    integers=("seed", "metric", "ideal", "radio_delay", "beacon_contacts", "alarm_slots", "targets"),
+    "alarm_slots", "targets", "landing_speed",
+    integers=("seed", "metric", "ideal", "radio_delay", "alarm_slots", "targets"),
 )  # fmt: skip
 
 # Where a vehicle is and how it moves: the truth in a study, telemetry in a flight.

@@ -107,8 +107,8 @@ class World:
     def share(self, tick: int) -> None:
         """Know: learn what was sensed, make this tick's beacons."""
         self.kernels.share(
-            self.memory, self.poses, self.knowledge, self.contacts, self.has, self.reports,
-            self.report_count, self.beacons, tick % self.depth, self.rules,
+            self.memory, self.fleet, self.poses, self.knowledge, self.contacts, self.has, self.reports,
+            self.report_count, self.beacons, tick % self.depth,
         )  # fmt: skip
 
     def deliver(self, tick: int) -> None:

@@ -224,6 +224,31 @@ class Encoder:
             ),
         )
 
+    def sys_status(
+        self,
+        sensors_present: int,
+        sensors_enabled: int,
+        sensors_health: int,
+        load: int,
+        voltage_battery: int,
+        current_battery: int,
+        battery_remaining: int,
+        drop_rate_comm: int,
+        *rest: int,
+    ) -> bytes:
+        """SYS_STATUS; ``rest``: errors_comm, four error counts and, if given, three extended sensor fields."""
+        extended = (*rest[5:], 0, 0, 0)[:3]
+        payload = messages.SYS_STATUS.payload.pack(
+            sensors_present, sensors_enabled, sensors_health, load, voltage_battery, current_battery,
+            drop_rate_comm, *rest[:5], battery_remaining, *extended,
+        )  # fmt: skip
+        return self._frame(messages.SYS_STATUS, payload)
+
+    def extended_sys_state(self, vtol_state: int, landed_state: int) -> bytes:
+        """EXTENDED_SYS_STATE."""
+        payload = messages.EXTENDED_SYS_STATE.payload.pack(vtol_state, landed_state)
+        return self._frame(messages.EXTENDED_SYS_STATE, payload)
+
     def global_position_int(
         self,
         time_boot_ms: int,

@@ -61,6 +61,34 @@ class Heartbeat(NamedTuple):
     mavlink_version: int
 
 
+class SysStatus(NamedTuple):
+    """SYS_STATUS: sensor bits, load in 0.1 %, battery in mV, cA and percent, link errors."""
+
+    onboard_control_sensors_present: int
+    onboard_control_sensors_enabled: int
+    onboard_control_sensors_health: int
+    load: int
+    voltage_battery: int
+    current_battery: int
+    drop_rate_comm: int
+    errors_comm: int
+    errors_count1: int
+    errors_count2: int
+    errors_count3: int
+    errors_count4: int
+    battery_remaining: int
+    onboard_control_sensors_present_extended: int
+    onboard_control_sensors_enabled_extended: int
+    onboard_control_sensors_health_extended: int
+
+
+class ExtendedSysState(NamedTuple):
+    """EXTENDED_SYS_STATE: whether the vehicle is on the ground."""
+
+    vtol_state: int
+    landed_state: int
+
+
 class SetPositionTargetLocalNed(NamedTuple):
     """SET_POSITION_TARGET_LOCAL_NED: a setpoint, of which ``type_mask`` names the fields to ignore."""
 
@@ -106,8 +134,18 @@ LOCAL_POSITION_NED = _hot(LocalPositionNed)
 ATTITUDE = _hot(Attitude)
 HEARTBEAT = _hot(Heartbeat)
 SET_POSITION_TARGET_LOCAL_NED = _hot(SetPositionTargetLocalNed)
+SYS_STATUS = _hot(SysStatus)
+EXTENDED_SYS_STATE = _hot(ExtendedSysState)
 
 HOT_MESSAGES = {
     hot.message_id: hot
-    for hot in (GLOBAL_POSITION_INT, LOCAL_POSITION_NED, ATTITUDE, HEARTBEAT, SET_POSITION_TARGET_LOCAL_NED)
+    for hot in (
+        GLOBAL_POSITION_INT,
+        LOCAL_POSITION_NED,
+        ATTITUDE,
+        HEARTBEAT,
+        SET_POSITION_TARGET_LOCAL_NED,
+        SYS_STATUS,
+        EXTENDED_SYS_STATE,
+    )
 }

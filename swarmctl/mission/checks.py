@@ -208,6 +208,18 @@ def _period(mission: Mission) -> Iterator[Finding]:
         yield Finding(("planner", "period_s"), message, "it must be a whole number of setpoint intervals")
 
 
+def _delay(mission: Mission) -> Iterator[Finding]:
+    """Beacons of all vehicles travel alike: the ring that holds those under way has one length."""
+    if isinstance(mission.vehicles, VehicleGroup):
+        return
+    for k, entry in enumerate(mission.vehicles):
+        if entry.radio is not None and "delay_s" in entry.radio.model_fields_set:
+            message = "the delay is that of the network, the same for all vehicles"
+            yield Finding(
+                ("vehicles", k, "radio", "delay_s"), message, "set radio.delay_s for the whole mission"
+            )
+
+
 class Check(NamedTuple):
     """A check and the keys that it reads."""
 
@@ -234,4 +246,5 @@ CHECKS = (
     Check(_minimum, (("safety", "minimum_vehicles"), ("vehicles", "count"))),
     Check(_targets, (("origin",), ("area",), ("targets",))),
     Check(_period, (("planner", "period_s"), ("setpoints", "rate_hz"))),
+    Check(_delay, (("vehicles",),)),
 )

@@ -82,7 +82,6 @@ class Scenario:
         row["separation"], row["duration"] = mission.safety.separation_m, mission.duration_s
         row["metric"], row["ideal"] = mission.planner.terms == "metric", self.ideal
         row["radio_delay"] = math.ceil(mission.radio.delay_s / period - 1e-9)
-        row["beacon_contacts"] = _contacts_a_beacon(mission.radio, period)
         row["alarm_slots"] = max(_alarm_slots(v, mission.duration_s) for v in mission.fleet)
         row["landing_speed"] = LANDING_MPS
         return rules
@@ -147,6 +146,7 @@ def _describe(row: np.void, vehicle: Vehicle, mission: Mission) -> None:
     row["alarms_per_second"] = sensor.false_alarms_per_hour / 3600.0
     row["position_noise"] = sensor.position_noise_m
     row["radio_range"], row["radio_loss"] = radio.range_m, radio.loss
+    row["beacon_contacts"] = _contacts_a_beacon(radio, mission.planner.period_s)
 
 
 def _contacts_a_beacon(radio: Radio, period: float) -> int:

@@ -16,11 +16,10 @@ Box = tuple[float, float, float, float]  # west, east, south, north
 VEHICLE = {
     "speed": 25.0, "acceleration": 4.0, "braking": 4.0, "climb": 3.0, "descent": 2.0,
     "climb_acceleration": 2.0, "altitude": 50.0, "sensor_range": 200.0, "detection_probability": 1.0,
-    "radio_range": 600.0, "heading_east": 1.0,
+    "radio_range": 600.0, "beacon_contacts": -1, "heading_east": 1.0,
 }  # fmt: skip
 RULES = {
-    "seed": 1, "period": 1.0, "interval": 0.1, "separation": 15.0, "duration": 60.0, "beacon_contacts": -1,
-    "landing_speed": 0.7,
+    "seed": 1, "period": 1.0, "interval": 0.1, "separation": 15.0, "duration": 60.0, "landing_speed": 0.7,
 }  # fmt: skip
 
 
@@ -87,3 +86,21 @@ def world_of(
     world = World(algorithm, fleet, rules, scene, fence, make_settings(algorithm, settings or {}))
     world.poses["east"], world.poses["north"] = fleet["pad_east"], fleet["pad_north"]
     return world
+
+
+PER_VEHICLE = ("poses", "memory", "knowledge", "contacts", "has", "told", "reports", "report_count", "wishes")
+REST = (
+    "alarms", "found", "beacons", "heard", "heard_count", "errands", "paths", "wants", "setpoints", "orders",
+)  # fmt: skip
+
+
+def snapshot(world: World) -> dict[str, bytes]:
+    """All of a world that changes, as bytes."""
+    return {name: getattr(world, name).tobytes() for name in (*PER_VEHICLE, *REST)}
+
+
+def restore(world: World, saved: dict[str, bytes]) -> None:
+    """Put a world back to what ``snapshot`` saved."""
+    for name, data in saved.items():
+        array = getattr(world, name)
+        array[...] = np.frombuffer(data, array.dtype).reshape(array.shape)

@@ -15,6 +15,7 @@ INTEGER_RANGES = {
     "uint8_t": (0, 0xFF),
     "uint16_t": (0, 0xFFFF),
     "uint32_t": (0, 0xFFFFFFFF),
+    "int8_t": (-0x80, 0x7F),
     "int16_t": (-0x8000, 0x7FFF),
     "int32_t": (-0x80000000, 0x7FFFFFFF),
 }

@@ -176,6 +176,10 @@ def test_a_wrong_key_is_named_with_its_place(complaints: Complaints, text: str, 
             "safety: {minimum_vehicles: 7}",
             "m.yaml:1:10: safety.minimum_vehicles: 7, but there are 6 vehicles",
         ),
+        (
+            "vehicles: [{speed_mps: 9}, {radio: {delay_s: 2}}]",
+            "m.yaml:1:38: vehicles[1].radio.delay_s: the delay is that of the network",
+        ),
         ("planner: {period_s: 0.25}", "m.yaml:1:11: planner.period_s: 0.25 s is 2.5 setpoints at 10 Hz"),
         (
             "targets: {positions_m: [[9, 9], [5001, 0]]}",

@@ -27,14 +27,14 @@ class Situation:
     def __init__(
         self, algorithm: str, places: Sequence[Place], headings: Sequence[float] = (),
         targets: Sequence[Place] = (), *, area: Box = FIELD, keep_outs: Sequence[Box] = (), margin: float = 0.0,
-        ideal: bool = True, **values: float,
+        ideal: bool = True, random: float = 0.0, **values: float,
     ) -> None:  # fmt: skip
         known = {p.name for p in planners.module(algorithm).PARAMETERS}
         settings = {k: v for k, v in values.items() if k in known}
         rules = {k: v for k, v in values.items() if k in RULES}
         vehicle = {k: v for k, v in values.items() if k not in known and k not in RULES}
         if "random" in known:
-            settings.setdefault("random", 0.0)
+            settings["random"] = random
         self.world = world_of(
             algorithm, fleet_of(places, headings, **vehicle), rules_of(ideal=ideal, **rules),
             fences(area, keep_outs, margin), targets, settings,
@@ -68,6 +68,11 @@ class Situation:
         if heading is not None:
             memory = self.world.memory
             memory["heading_east"][i], memory["heading_north"][i] = direction(heading)
+        return self
+
+    def forget(self) -> "Situation":
+        """Let everybody forget what they know, so that all targets are new again."""
+        self.world.has[:], self.world.told[:], self.world.knowledge["known"] = 0, 0, 0
         return self
 
     def heading(self, i: int = 0) -> float:

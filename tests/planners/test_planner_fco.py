@@ -140,7 +140,7 @@ def test_a_revisit_ends_at_its_point_and_the_next_waits_200_s() -> None:
 def test_a_revisit_is_given_up_for_a_new_target() -> None:
     s = left().plan(200)
     assert s.remembers("revisiting") == 1
-    s.world.has[0, :] = 0  # it forgets what it knows, so that there is something new
+    s.forget()  # so that there is something new
     s.put(0, HERE, 0.0).plan()
     assert s.remembers("revisiting") == 0
     assert s.heading() == near(along((0.4, 0.0), (0.4, bearing(HERE, FURTHER))))
