@@ -118,7 +118,7 @@ def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
             return
         from .record.replay import replay as recompute
 
-        say("recomputing the recorded decisions (the first time kernels are compiled)")
+        say("recomputing the recorded decisions")
         result = recompute(mcap_read.read(folder.mcap), algorithm)
         if as_json:
             click.echo(json.dumps(result.as_json(), indent=2, allow_nan=False))

@@ -26,13 +26,18 @@ ONCE = ("/rules", "/fleet", "/settings", "/targets", "/fence")
 
 @dataclass
 class Replayed:
-    """What a replay found.  ``largest_difference_mps``: of any velocity, wished or set."""
+    """What a replay found.
+
+    ``largest_difference_mps`` is of any velocity component, wished or set; ``mean_difference_mps`` is the mean
+    length of the difference between recorded and recomputed wishes.
+    """
 
     decisions: int = 0
     identical: int = 0
     setpoints: int = 0
     setpoints_identical: int = 0
     largest_difference_mps: float = 0.0
+    mean_difference_mps: float = 0.0
     first_difference: dict[str, Any] | None = None
     truncated: bool = False
 
@@ -42,13 +47,13 @@ class Replayed:
 
     def as_text(self) -> str:
         """A few lines for a person: how many are identical, or the first that is not and what went in."""
-        lines = [
-            f"{self.identical} of {self.decisions} decisions identical, "
-            f"{self.setpoints_identical} of {self.setpoints} setpoints"
-        ]
+        lines = [f"{self.identical} of {self.decisions} decisions identical"]
+        if self.setpoints:
+            lines[0] += f", {self.setpoints_identical} of {self.setpoints} setpoints"
         if not self.same:
             lines.append(
-                f"velocities differ by up to {self.largest_difference_mps:.6g} m/s; the first that does:"
+                f"wishes differ by {self.mean_difference_mps:.3g} m/s on average, "
+                f"velocities by {self.largest_difference_mps:.6g} m/s at most; the first that does:"
             )
             lines.append(json.dumps(self.first_difference, indent=2))
         if self.truncated:
@@ -130,6 +135,7 @@ class _Replayer:
     other: bool
     result: Replayed = field(default_factory=Replayed)
     begun: bool = False
+    apart_mps: float = 0.0
 
     def __post_init__(self) -> None:
         self.good = np.zeros(len(self.world.fleet), bool)  # the current decision's standing, per vehicle
@@ -148,6 +154,7 @@ class _Replayer:
         """Close the last decision and give the result."""
         if self.begun:
             self.result.identical += int(self.good.sum())
+            self.result.mean_difference_mps = self.apart_mps / self.result.decisions
             self.begun = False
         return self.result
 
@@ -168,13 +175,10 @@ class _Replayer:
         self.begun = True
         self.good[:] = True
         self.result.decisions += len(world.fleet)
-        self._compare(
-            "plan",
-            tick,
-            decided.time_s,
-            as_now(decided.rows, rows.DECISION, "/decisions"),
-            rows.decisions(world),
-        )
+        recorded = as_now(decided.rows, rows.DECISION, "/decisions")
+        apart = (recorded[name] - world.wishes[name] for name in ("v_east", "v_north"))
+        self.apart_mps += float(np.hypot(*apart).sum())
+        self._compare("plan", tick, decided.time_s, recorded, rows.decisions(world))
 
     def _give_reports(self, recorded: Records) -> None:
         self.world.report_count[:] = 0

@@ -178,7 +178,7 @@ def test_a_wrong_key_is_named_with_its_place(complaints: Complaints, text: str, 
         ),
         (
             "vehicles: [{speed_mps: 9}, {radio: {delay_s: 2}}]",
-            "m.yaml:1:38: vehicles[1].radio.delay_s: the delay is that of the network",
+            "m.yaml:1:37: vehicles[1].radio.delay_s: the delay is that of the network",
         ),
         ("planner: {period_s: 0.25}", "m.yaml:1:11: planner.period_s: 0.25 s is 2.5 setpoints at 10 Hz"),
         (
