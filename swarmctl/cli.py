@@ -7,8 +7,8 @@ place that knows both the controller and the stub.
 import json
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from .flight.lockstep import Vehicles
     from .mission.model import Mission
 
-BAD_INPUT, DIFFERS, FAILED = 2, 5, 1
+BAD_INPUT, FAILED, REFUSED, ABORTED, DIFFERS = 2, 1, 3, 4, 5
+LEAST_MARGIN_M = 2.0
+MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
 PathArgument = click.Path(path_type=Path)
 
 
@@ -36,7 +38,8 @@ def say(text: str) -> None:
 @contextmanager
 def plain_errors() -> Iterator[None]:
     """Turn what bad input raises into a message and an exit code; nobody sees a traceback for it."""
-    from .flight.swarm import FlightError
+    from .flight.fly import StoppedError
+    from .flight.swarm import FlightError, RefusedError
     from .mission.errors import MissionError
     from .record.errors import RecordError
 
@@ -45,9 +48,20 @@ def plain_errors() -> Iterator[None]:
     except (MissionError, RecordError) as error:
         say(str(error))
         sys.exit(BAD_INPUT)
+    except StoppedError as error:
+        say(str(error))
+        sys.exit(ABORTED)
+    except RefusedError as error:
+        say(f"refused: {error}")
+        sys.exit(REFUSED)
     except FlightError as error:
         say(f"the flight failed: {error}")
         sys.exit(FAILED)
+    except OSError as error:
+        say(f"cannot write: {error.strerror or error}")
+        with suppress(OSError):
+            sys.stdout.close()  # or the interpreter would try again to write what is left
+        sys.exit(BAD_INPUT)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -98,6 +112,8 @@ def fly(
             click.echo(json.dumps(summary, indent=2, allow_nan=False))
         else:
             _print_summary(summary)
+        for line in outcome.complaints():
+            say(line)
         sys.exit(outcome.exit_code())
 
 
@@ -108,6 +124,8 @@ def fly(
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, and nothing else, on stdout.")
 def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
     """Recompute every recorded decision of RUN, plan and guard, and compare bit for bit."""
+    if stub and algorithm:
+        raise click.UsageError("--stub sends the recorded setpoints: no --algo can change them")
     with plain_errors():
         from .record import mcap_read
         from .record.folder import RunFolder
@@ -148,6 +166,11 @@ def check(mission_file: Path | None) -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def algos(as_json: bool) -> None:
     """What can be flown, with its parameters, their defaults and where they come from."""
+    with plain_errors():
+        _print_algorithms(as_json)
+
+
+def _print_algorithms(as_json: bool) -> None:
     from .core import planners
 
     table = {name: planners.module(name) for name in MODULES}
@@ -191,15 +214,38 @@ def _refuse_what_stubs_cannot(mission: "Mission") -> None:
         complaints.append(
             "dynamics: fly flies multicopters, not ideal points (leave the key out, or study it)"
         )
+    if mission.safety.fence_margin_m < LEAST_MARGIN_M:
+        complaints.append(
+            f"safety.fence_margin_m: a flight needs {LEAST_MARGIN_M:g} m for the guard (raise it)"
+        )
     if any(mission.stub.wind_mps):
         complaints.append("stub.wind_mps: the stub has no wind yet (set it to [0, 0])")
     if mission.stub.autopilot != "px4" or any(v.autopilot == "ardupilot" for v in mission.fleet):
         complaints.append("stub.autopilot: the stub plays px4 so far (set it to px4)")
+    if len(mission.fleet) > MOST_SYSTEMS:
+        complaints.append(f"vehicles: MAVLink tells {MOST_SYSTEMS} vehicles apart (fly fewer, or study more)")
     if any(v.connect for v in mission.fleet):
         complaints.append("vehicles.connect: real vehicles cannot be flown yet (leave the key out)")
+    if mission.launch == "as_found":
+        complaints += _stub_pads(mission)
     if complaints:
         say("\n".join(complaints))
         sys.exit(BAD_INPUT)
+
+
+def _stub_pads(mission: "Mission") -> list[str]:
+    """What is wrong with the corner grid that stubs stand in where a mission takes vehicles as found."""
+    from .mission.scenario import Scenario
+
+    try:
+        Scenario(mission, ideal=False).starts  # noqa: B018 - tried, not used
+    except ValueError as error:
+        return [f"vehicles.launch: as_found: {error} (stubs stand in a corner grid; name their pads instead)"]
+    if mission.spacing_m < mission.safety.separation_m:
+        return [
+            "vehicles.spacing_m: less than safety.separation_m (stubs stand in a grid; put them further apart)"
+        ]
+    return []
 
 
 def _warm_up(mission: "Mission", name: str) -> None:
@@ -215,7 +261,9 @@ def _make_stubs(mission: "Mission", world: "World") -> "Vehicles":
     """Stub vehicles that fly as the mission says, standing on its pads."""
     from sim_vehicle_stub.configured import configured_fleet
 
-    endurance = [v.endurance_s or 2.0 * mission.duration_s for v in mission.fleet]
+    from .flight.fly import endurance_s
+
+    endurance = endurance_s(mission)
     origin = (mission.origin.lat, mission.origin.lon, mission.origin.alt_m)
     return configured_fleet(world.fleet, origin, endurance, 1.0 / mission.setpoints.rate_hz)
 
@@ -226,9 +274,13 @@ def _interruptible(orders: "Orders") -> Iterator[None]:
 
     def obey(number: int, frame: FrameType | None) -> None:
         orders.interrupt()
-        if orders.level > 2:
-            raise KeyboardInterrupt
-        say("landing now" if orders.level == 2 else "returning; press Ctrl-C again to land now")
+        words = (
+            "",
+            "returning; press Ctrl-C again to land now",
+            "landing now; again to stop at once",
+            "stopping",
+        )
+        say(words[min(orders.level, 3)])
 
     before: dict[int, Any] = {n: signal.signal(n, obey) for n in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -293,6 +345,5 @@ def _replay_stub(folder: Any, as_json: bool) -> None:
     sys.exit(0 if result.same else DIFFERS)
 
 
-Command = Callable[..., None]
 if __name__ == "__main__":
     main()

@@ -36,7 +36,9 @@ def crosses(edges: Floats, ax: float, ay: float, bx: float, by: float) -> bool:
             continue
         side_0 = (bx - ax) * (y0 - ay) - (by - ay) * (x0 - ax)
         side_1 = (bx - ax) * (y1 - ay) - (by - ay) * (x1 - ax)
-        if side_0 * side_1 >= 0.0:
+        if (side_0 > 0.0) == (
+            side_1 > 0.0
+        ):  # a corner on the line belongs to one side, so none slips through
             continue
         side_a = (x1 - x0) * (ay - y0) - (y1 - y0) * (ax - x0)
         side_b = (x1 - x0) * (by - y0) - (y1 - y0) * (bx - x0)

@@ -19,6 +19,7 @@ HEIGHT_SEPARATION_M = 5.0  # vehicles nearer than this in height must be separat
 HEIGHT_MARGIN_M = 0.7  # two vehicles' height errors together
 SEPARATION_MARGIN_M = 0.5  # rounding of positions and velocities on the wire, curvature of a turn
 BRAKING_SHARE = 0.9  # of the vehicle's braking is counted on
+MOST_UNDER_WAY = 32  # setpoints within the latency
 RECOVERY_MPS = 3.0  # back towards the fence from outside
 
 KEPT, TURNED, BRAKED, RECOVERING, UNGUARDED = 0, 1, 2, 3, 4
@@ -44,29 +45,35 @@ def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> t
 
 
 @kernel
+def under_way(fleet: Records, i: int, interval: float) -> int:
+    """How many setpoints were sent and have not acted yet: the vehicle's latency in whole intervals, rounded up."""
+    intervals: int = math.ceil(fleet[i].latency / interval - 1e-9)
+    return min(intervals, MOST_UNDER_WAY)
+
+
+@kernel
 def _coast(
-    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, interval: float
+    fleet: Records, i: int, poses: Records, sent: Floats, cx: float, cy: float, interval: float, last: bool
 ) -> tuple[float, float, float, float]:
-    """Position and velocity after the latency under the last setpoint and ``interval`` s under (cx, cy)."""
+    """Position and velocity when the setpoints under way have acted, and (``last``) then (cx, cy) for an interval."""
     x, y, vx, vy = poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north
     speed, acceleration, lag = fleet[i].speed, fleet[i].acceleration, fleet[i].lag
-    if fleet[i].latency > 0.0:
+    for h in range(under_way(fleet, i, interval) - 1, -1, -1):
         x, y, vx, vy = motion.horizontal(
-            x, y, vx, vy, setpoints[i].v_east, setpoints[i].v_north, speed, acceleration, lag,
-            fleet[i].latency,
-        )  # fmt: skip
-    if interval > 0.0:
+            x, y, vx, vy, sent[i, h, 0], sent[i, h, 1], speed, acceleration, lag, interval
+        )
+    if last:
         x, y, vx, vy = motion.horizontal(x, y, vx, vy, cx, cy, speed, acceleration, lag, interval)
     return x, y, vx, vy
 
 
 @kernel
 def _write_path(
-    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, interval: float,
+    fleet: Records, i: int, poses: Records, sent: Floats, cx: float, cy: float, interval: float, last: bool,
     paths: Records, row: int,
 ) -> None:  # fmt: skip
-    """Write into ``paths[row]`` the path vehicle ``i`` will own after ``interval`` s of command (cx, cy)."""
-    x, y, vx, vy = _coast(fleet, i, poses, setpoints, cx, cy, interval)
+    """Write into ``paths[row]`` the path vehicle ``i`` owns, or will own after an interval of (cx, cy)."""
+    x, y, vx, vy = _coast(fleet, i, poses, sent, cx, cy, interval, last)
     end_x, end_y = _stop(fleet, i, x, y, vx, vy)
     east, north = poses[i].east, poses[i].north
     paths[row].east_0, paths[row].north_0 = east, north
@@ -79,11 +86,11 @@ def _write_path(
 
 @kernel
 def own_path(
-    fleet: Records, i: int, poses: Records, setpoints: Records, wanted_up: float, airborne: bool,
+    fleet: Records, i: int, poses: Records, sent: Floats, interval: float, wanted_up: float, airborne: bool,
     paths: Records,
 ) -> None:  # fmt: skip
-    """Write the stop path that vehicle ``i`` owns as it is now, braking at once."""
-    _write_path(fleet, i, poses, setpoints, 0.0, 0.0, 0.0, paths, i)
+    """Write the stop path that vehicle ``i`` owns as it is now, braking as soon as it can be told to."""
+    _write_path(fleet, i, poses, sent, 0.0, 0.0, interval, False, paths, i)
     paths[i].low = min(poses[i].up, wanted_up)
     paths[i].high = max(poses[i].up, wanted_up)
     paths[i].airborne = 1 if airborne else 0
@@ -118,11 +125,26 @@ def same_height(paths: Records, a: int, b: int) -> bool:
 
 
 @kernel
-def _apart(paths: Records, i: int, row: int, separation: float) -> bool:
+def _ahead_distance(paths: Records, a: int, b: int) -> float:
+    """Squared distance (m²) of what path ``a`` holds after the coming interval from all of path ``b``."""
+    ax, ay, bx, by = paths[a].east_1, paths[a].north_1, paths[a].east_2, paths[a].north_2
+    return min(
+        fence.segment_to_segment(
+            ax, ay, bx, by, paths[b].east_0, paths[b].north_0, paths[b].east_1, paths[b].north_1
+        ),
+        fence.segment_to_segment(
+            ax, ay, bx, by, paths[b].east_1, paths[b].north_1, paths[b].east_2, paths[b].north_2
+        ),
+    )
+
+
+@kernel
+def _apart(paths: Records, i: int, row: int, separation: float, gain: float) -> bool:
     """Whether candidate ``paths[row]`` of vehicle ``i`` keeps clear of every other vehicle's path.
 
-    Where the path vehicle ``i`` owns is already nearer than that (two that were launched so), it may not come
-    nearer still.
+    Where the path vehicle ``i`` owns is already nearer than that (rounding, wind, two launched so), the candidate
+    must lead apart by ``gain`` metres in the coming interval.  Not coming nearer would not do: what rounding
+    hides, a millimetre a tick, would add up.
     """
     wanted = separation + SEPARATION_MARGIN_M
     for j in range(paths.shape[0] - 1):
@@ -133,16 +155,18 @@ def _apart(paths: Records, i: int, row: int, separation: float) -> bool:
         room = wanted + paths[row].reach + paths[j].reach
         if dx * dx + dy * dy > room * room:
             continue
-        distance = path_distance(paths, row, j)
-        if distance < wanted * wanted and distance < path_distance(paths, i, j) * (1.0 - 1e-9):
+        if path_distance(paths, row, j) >= wanted * wanted:
+            continue
+        owned = math.sqrt(path_distance(paths, i, j))
+        if owned >= wanted or math.sqrt(_ahead_distance(paths, row, j)) < owned + gain:
             return False
     return True
 
 
 @kernel
 def _within(paths: Records, row: int, edges: Floats) -> bool:
-    """Whether a path that begins inside the fence stays there."""
-    return not (
+    """Whether a path that begins inside the fence stays there; its end may not lie beyond a corner it touched."""
+    return fence.inside(edges, paths[row].east_2, paths[row].north_2) and not (
         fence.crosses(edges, paths[row].east_0, paths[row].north_0, paths[row].east_1, paths[row].north_1)
         or fence.crosses(edges, paths[row].east_1, paths[row].north_1, paths[row].east_2, paths[row].north_2)
     )
@@ -150,15 +174,16 @@ def _within(paths: Records, row: int, edges: Floats) -> bool:
 
 @kernel
 def _accept(
-    fleet: Records, i: int, poses: Records, setpoints: Records, cx: float, cy: float, rules: Records,
-    edges: Floats, paths: Records, fenced: bool,
+    fleet: Records, i: int, poses: Records, sent: Floats, setpoints: Records, cx: float, cy: float,
+    rules: Records, edges: Floats, paths: Records, fenced: bool,
 ) -> bool:  # fmt: skip
     """Whether vehicle ``i`` may be told (cx, cy); if so it owns the new path, and the setpoint is written."""
     row = paths.shape[0] - 1
-    _write_path(fleet, i, poses, setpoints, cx, cy, rules[0].interval, paths, row)
+    _write_path(fleet, i, poses, sent, cx, cy, rules[0].interval, True, paths, row)
     if fenced and not _within(paths, row, edges):
         return False
-    if not _apart(paths, i, row, rules[0].separation):
+    interval = rules[0].interval
+    if not _apart(paths, i, row, rules[0].separation, 0.25 * fleet[i].acceleration * interval * interval):
         return False
     paths[i].east_1, paths[i].north_1 = paths[row].east_1, paths[row].north_1
     paths[i].east_2, paths[i].north_2 = paths[row].east_2, paths[row].north_2
@@ -176,14 +201,17 @@ def _brake(setpoints: Records, i: int) -> None:
 
 @kernel
 def _recover(
-    fleet: Records, i: int, poses: Records, setpoints: Records, rules: Records, edges: Floats, paths: Records
-) -> None:
+    fleet: Records, i: int, poses: Records, sent: Floats, setpoints: Records, rules: Records, edges: Floats,
+    paths: Records,
+) -> None:  # fmt: skip
     """Outside the fence (wind, a pilot): slowly back by the shortest way, if others leave room."""
     x, y = fence.nearest(edges, poses[i].east, poses[i].north)
     dx, dy = x - poses[i].east, y - poses[i].north
     size = max(math.sqrt(dx * dx + dy * dy), 1e-9)
     speed = min(RECOVERY_MPS, fleet[i].speed)
-    if _accept(fleet, i, poses, setpoints, speed * dx / size, speed * dy / size, rules, edges, paths, False):
+    if _accept(
+        fleet, i, poses, sent, setpoints, speed * dx / size, speed * dy / size, rules, edges, paths, False
+    ):
         setpoints[i].outcome = RECOVERING
     else:
         _brake(setpoints, i)
@@ -192,11 +220,12 @@ def _recover(
 @kernel
 def guard(
     fleet: Records, i: int, poses: Records, wish_x: float, wish_y: float, rules: Records, edges: Floats,
-    paths: Records, setpoints: Records,
+    paths: Records, sent: Floats, setpoints: Records,
 ) -> None:  # fmt: skip
     """Write vehicle ``i``'s setpoint: the wish (m/s), or the nearest velocity to it that keeps the invariant.
 
-    ``paths`` (V + 1,) holds every vehicle's stop path, and a row for the candidate.
+    ``paths`` (V + 1,) holds every vehicle's stop path, and a row for the candidate; ``sent`` (V, 33, 2) the
+    velocities set before, the newest first.
     """
     if not (math.isfinite(wish_x) and math.isfinite(wish_y)):
         wish_x, wish_y = 0.0, 0.0
@@ -205,13 +234,13 @@ def guard(
         wish_x *= fleet[i].speed / size
         wish_y *= fleet[i].speed / size
     if not fence.inside(edges, poses[i].east, poses[i].north):
-        _recover(fleet, i, poses, setpoints, rules, edges, paths)
+        _recover(fleet, i, poses, sent, setpoints, rules, edges, paths)
         return
     for s in range(len(SPEEDS)):
         for k in range(len(COSINES)):
             cx = SPEEDS[s] * (COSINES[k] * wish_x - SINES[k] * wish_y)
             cy = SPEEDS[s] * (SINES[k] * wish_x + COSINES[k] * wish_y)
-            if _accept(fleet, i, poses, setpoints, cx, cy, rules, edges, paths, True):
+            if _accept(fleet, i, poses, sent, setpoints, cx, cy, rules, edges, paths, True):
                 setpoints[i].outcome = KEPT if s == 0 and k == 0 else TURNED
                 return
     _brake(setpoints, i)

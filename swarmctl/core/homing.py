@@ -75,7 +75,7 @@ def _layer_taken(
 
 
 @kernel
-def _choose_layer(fleet: Records, poses: Records, errands: Records, i: int, separation: float) -> float:
+def choose_layer(fleet: Records, poses: Records, errands: Records, i: int, separation: float) -> float:
     """The lowest free layer: the own search height, then 6 m steps above the highest search height."""
     room = separation + MEETING_MARGIN_M
     height = float(fleet[i].altitude)
@@ -104,17 +104,21 @@ def _find_route(
 
 @kernel
 def order_home(
-    fleet: Records, poses: Records, errands: Records, i: int, now: float, rules: Records, plan_edges: Floats,
+    fleet: Records, poses: Records, errands: Records, i: int, now: float, plan_edges: Floats,
     guard_edges: Floats,
 ) -> None:  # fmt: skip
-    """Send vehicle ``i`` home: find its way, its layer and its place in the queue."""
+    """Send vehicle ``i`` home: find its way and its place in the queue.  Its layer is chosen afterwards.
+
+    Until then it is in nobody's layer, so that of several ordered at once the first may take the search height.
+    """
     _find_route(fleet, poses, errands, i, plan_edges, guard_edges)
-    errands[i].layer = _choose_layer(fleet, poses, errands, i, rules[0].separation)
     ahead = 0
     for j in range(errands.shape[0]):
         if stages.WAIT <= errands[j].stage <= stages.CLIMB:
             ahead += 1
     errands[i].release_at = now + RELEASE_S * ahead
+    errands[i].wait_up = poses[i].up
+    errands[i].layer = math.inf
     errands[i].stage = stages.WAIT
 
 
@@ -177,7 +181,7 @@ def _wait(
     fleet: Records, poses: Records, errands: Records, i: int, paths: Records, rules: Records, wants: Records
 ) -> None:
     """Hover until the column to the layer is clear; whoever stands in it, step aside of."""
-    wants[i].up = poses[i].up
+    wants[i].up = errands[i].wait_up
     low, high = min(poses[i].up, errands[i].layer), max(poses[i].up, errands[i].layer)
     x, y = poses[i].east, poses[i].north
     speed = math.sqrt(poses[i].v_east * poses[i].v_east + poses[i].v_north * poses[i].v_north)
@@ -238,12 +242,12 @@ def home(
     elif stage >= stages.OVER_PAD:
         x, y = fleet[i].pad_east, fleet[i].pad_north
         distance = _head_for(fleet, poses, i, x, y, True, wants)
-        if stage == stages.OVER_PAD:
+        if stage == stages.OVER_PAD and distance < ARRIVED_M:
             blocked = _still_to_pass(fleet, poses, errands, i, rules[0].separation)
             if not blocked and _in_column(paths, i, x, y, 0.0, poses[i].up, rules[0].separation) < 0:
                 errands[i].stage = stages.DESCEND
                 paths[i].low = 0.0
-        else:
+        elif stage != stages.OVER_PAD:
             wants[i].up = LANDING_HEIGHT_M if stage == stages.DESCEND else 0.0
             if (
                 stage == stages.DESCEND

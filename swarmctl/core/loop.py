@@ -127,7 +127,7 @@ def run_multicopter(
     told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records, settings: Records,
-    wishes: Records, errands: Records, paths: Records, wants: Records, setpoints: Records,
+    wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats, setpoints: Records,
     orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
 ) -> int:  # fmt: skip
     """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
@@ -158,9 +158,9 @@ def run_multicopter(
             )
         steering.steer(
             fleet, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, paths, wants,
-            setpoints,
+            sent, setpoints,
         )  # fmt: skip
-        steering.move(fleet, poses, errands, setpoints, rules)
+        steering.move(fleet, poses, errands, sent, setpoints, rules)
         steering.watch(poses, errands, raw_edges, account)
         if steering.all_landed(errands):
             return k

@@ -26,7 +26,7 @@ LAUNCH = 1 << 40  # initial headings
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
-_S11 = np.uint64(11)
+_S12 = np.uint64(12)
 _S27 = np.uint64(27)
 _S30 = np.uint64(30)
 _S31 = np.uint64(31)
@@ -49,7 +49,8 @@ def _absorb(state: np.uint64, part: int) -> np.uint64:
 def uniform(seed: int, vehicle: int, tick: int, stream: int) -> float:
     """A number in (0, 1), never 0 or 1; all four parts of the key are whole and not negative."""
     bits = _absorb(_absorb(_absorb(_absorb(_GOLDEN, seed), vehicle), tick), stream)
-    return (float(bits >> _S11) + 0.5) * (1.0 / 9007199254740992.0)
+    # 52 bits and a half: with 53 the half would be rounded away, and the greatest number be 1.
+    return (float(bits >> _S12) + 0.5) * (1.0 / 4503599627370496.0)
 
 
 @kernel
@@ -109,7 +110,7 @@ def inverse_normal(p: float) -> float:
     top = top * r + 1.33141667891784377450e2
     top = top * r + 3.38713287279636660800e0
     low = 5.22649527885285456100e3
-    low = low * r + 2.87290857356109426740e4
+    low = low * r + 2.87290857357219426740e4
     low = low * r + 3.93078958000927106100e4
     low = low * r + 2.12137943015865958670e4
     low = low * r + 5.39419602142475110770e3

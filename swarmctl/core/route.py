@@ -16,6 +16,7 @@ from .state import ROUTE_POINTS
 
 @kernel
 def _sees(guard_edges: Floats, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether one may fly straight from a to b, both inside or on the border."""
     if fence.crosses(guard_edges, ax, ay, bx, by):
         return False
     return fence.inside(guard_edges, 0.5 * (ax + bx), 0.5 * (ay + by))

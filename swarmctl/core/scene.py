@@ -29,16 +29,20 @@ def place_centres(
     """Draw ``count`` cluster centres into ``centres`` (count, 2).
 
     At least 3 radii from every point of ``starts`` (S, 2) and 2.9 radii from one another; both distances
-    give way by 0.5 % a try, so that it always ends.  ``box``: west, east, south, north.
+    give way by 0.5 % a try.  ``box`` (2, 4): west, east, south, north of where centres are drawn, and of the whole
+    area, from which they are drawn when the first has held nothing legal for long.  So it always ends: a cluster for
+    which no legal place is found at all lies at the first start.
     """
     attempt = 0
     for k in range(count):
         ease = 1.0
-        while True:
+        centres[k, 0], centres[k, 1] = starts[0, 0], starts[0, 1]
+        for trial in range(4 * TRIES):
             attempt += 1
             ease *= 0.995
-            x = box[0] + (box[1] - box[0]) * _draw(seed, k, attempt, 0)
-            y = box[2] + (box[3] - box[2]) * _draw(seed, k, attempt, 1)
+            b = 0 if trial < TRIES else 1
+            x = box[b, 0] + (box[b, 1] - box[b, 0]) * _draw(seed, k, attempt, 0)
+            y = box[b, 2] + (box[b, 3] - box[b, 2]) * _draw(seed, k, attempt, 1)
             if not fence.inside(raw, x, y):
                 continue
             clear = True

@@ -82,7 +82,7 @@ PATH = record(
 ROUTE_POINTS = 24
 # A vehicle's stage of the flight (core/stages.py) and its way home.
 ERRAND = record(
-    "stage", "points", "next", "layer", "release_at", "progress_at", "closest",
+    "stage", "points", "next", "layer", "wait_up", "release_at", "progress_at", "closest",
     ("route_east", ROUTE_POINTS), ("route_north", ROUTE_POINTS),
     integers=("stage", "points", "next"),
 )  # fmt: skip

@@ -12,6 +12,8 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
     """The height a vehicle is on its way to."""
     stage = errands[i].stage
     if stage == stages.WAIT:
+        return float(errands[i].wait_up)
+    if stage == stages.ADRIFT:
         return float(poses[i].up)
     if stage < stages.WAIT:
         return float(fleet[i].altitude)
@@ -26,18 +28,22 @@ def begin_return(
     """Send home every vehicle with a one in ``orders`` (V,)."""
     for i in range(orders.shape[0]):
         if orders[i] != 0:
-            homing.order_home(fleet, poses, errands, i, now, rules, plan_edges, guard_edges)
+            homing.order_home(fleet, poses, errands, i, now, plan_edges, guard_edges)
+    for i in range(orders.shape[0]):
+        if orders[i] != 0:
+            errands[i].layer = homing.choose_layer(fleet, poses, errands, i, rules[0].separation)
 
 
 @kernel
 def steer(
     fleet: Records, poses: Records, errands: Records, wishes: Records, now: float, rules: Records,
-    plan_edges: Floats, guard_edges: Floats, paths: Records, wants: Records, setpoints: Records,
+    plan_edges: Floats, guard_edges: Floats, paths: Records, wants: Records, sent: Floats, setpoints: Records,
 ) -> None:  # fmt: skip
     """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
     for i in range(fleet.shape[0]):
-        airborne = stages.TAKE_OFF <= errands[i].stage <= stages.LAND
-        guard.own_path(fleet, i, poses, setpoints, _wanted_up(fleet, errands, poses, i), airborne, paths)
+        airborne = stages.airborne(errands[i].stage)
+        up = _wanted_up(fleet, errands, poses, i)
+        guard.own_path(fleet, i, poses, sent, rules[0].interval, up, airborne, paths)
     for i in range(fleet.shape[0]):
         stage = errands[i].stage
         wants[i].v_east, wants[i].v_north, wants[i].up = 0.0, 0.0, fleet[i].altitude
@@ -48,11 +54,14 @@ def steer(
         setpoints[i].up = wants[i].up
         if stages.SEARCH <= stage <= stages.LAND:
             guard.guard(
-                fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, setpoints
+                fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, sent, setpoints
             )
         else:
             setpoints[i].v_east, setpoints[i].v_north = 0.0, 0.0
             setpoints[i].outcome = guard.UNGUARDED
+        for h in range(sent.shape[1] - 1, 0, -1):
+            sent[i, h, 0], sent[i, h, 1] = sent[i, h - 1, 0], sent[i, h - 1, 1]
+        sent[i, 0, 0], sent[i, 0, 1] = setpoints[i].v_east, setpoints[i].v_north
 
 
 @kernel
@@ -69,14 +78,17 @@ def _climb(
 
 
 @kernel
-def move(fleet: Records, poses: Records, errands: Records, setpoints: Records, rules: Records) -> None:
-    """Let every airborne vehicle of a study follow its setpoint for one interval."""
+def move(
+    fleet: Records, poses: Records, errands: Records, sent: Floats, setpoints: Records, rules: Records
+) -> None:
+    """Let every airborne vehicle of a study follow, for one interval, the setpoint that its latency lets act now."""
     for i in range(fleet.shape[0]):
         if errands[i].stage < stages.TAKE_OFF or errands[i].stage > stages.LAND:
             continue
+        late = guard.under_way(fleet, i, rules[0].interval)
         east, north, v_east, v_north = motion.horizontal(
-            poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north, setpoints[i].v_east,
-            setpoints[i].v_north, fleet[i].speed, fleet[i].acceleration, fleet[i].lag, rules[0].interval,
+            poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north, sent[i, late, 0],
+            sent[i, late, 1], fleet[i].speed, fleet[i].acceleration, fleet[i].lag, rules[0].interval,
         )  # fmt: skip
         poses[i].east, poses[i].north = east, north
         poses[i].v_east, poses[i].v_north = v_east, v_north
@@ -111,7 +123,7 @@ def all_landed(errands: Records) -> bool:
 def watch(poses: Records, errands: Records, raw_edges: Floats, account: Floats) -> None:
     """Add this tick to ``account``: nearest approach (m), vehicle-ticks outside, standing, searching."""
     for i in range(poses.shape[0]):
-        if not stages.TAKE_OFF <= errands[i].stage <= stages.LAND:
+        if not stages.airborne(errands[i].stage):
             continue
         if not fence.inside(raw_edges, poses[i].east, poses[i].north):
             account[1] += 1.0
@@ -120,7 +132,7 @@ def watch(poses: Records, errands: Records, raw_edges: Floats, account: Floats) 
             account[2] += 1.0 if speed < 0.5 else 0.0
             account[3] += 1.0
         for j in range(i):
-            if not stages.TAKE_OFF <= errands[j].stage <= stages.LAND:
+            if not stages.airborne(errands[j].stage):
                 continue
             if abs(poses[i].up - poses[j].up) < guard.HEIGHT_SEPARATION_M:
                 dx, dy = poses[i].east - poses[j].east, poses[i].north - poses[j].north

@@ -7,6 +7,7 @@ import numpy as np
 
 from . import bind, calls, planners, state
 from .arrays import Flags, Floats, Integers, Records
+from .guard import MOST_UNDER_WAY
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ class World:
         self.paths = np.zeros(count + 1, state.PATH)
         self.wants = np.zeros(count, state.WANT)
         self.setpoints = np.zeros(count, state.SETPOINT)
+        self.sent: Floats = np.zeros((count, MOST_UNDER_WAY + 1, 2))
         self.orders: Integers = np.zeros(count, np.int64)
 
     @property
@@ -141,7 +143,7 @@ class World:
         """Homing and guard: this setpoint tick's ``setpoints``."""
         calls.steer(
             self.fleet, self.poses, self.errands, self.wishes, now, self.rules, self.fences.plan,
-            self.fences.guard, self.paths, self.wants, self.setpoints,
+            self.fences.guard, self.paths, self.wants, self.sent, self.setpoints,
         )  # fmt: skip
 
     def run_ideal(self) -> Integers:
@@ -171,6 +173,6 @@ class World:
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.fences.guard,
             self.fences.raw, self.rules, self.settings, self.wishes, self.errands, self.paths, self.wants,
-            self.setpoints, self.orders, in_range, account, most,
+            self.sent, self.setpoints, self.orders, in_range, account, most,
         )  # fmt: skip
         return in_range, account, ticks * float(rules["interval"])

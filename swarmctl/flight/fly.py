@@ -27,6 +27,13 @@ from .track import Track
 REPORT_EVERY_S = 10.0
 
 
+STUB_RESERVE_S = 600.0
+
+
+class StoppedError(Exception):
+    """The operator stopped the program at once; vehicles are left to their own failsafe."""
+
+
 @dataclass
 class Orders:
     """What the operator asks for while the flight is under way: 1 all return, 2 all land."""
@@ -41,6 +48,11 @@ class Orders:
 
 Report = Callable[[float, Swarm, World], None]
 """Called every ten seconds of flight with its time, the swarm and the world."""
+
+
+def endurance_s(mission: Mission) -> list[float]:
+    """How long each stub vehicle can fly: as the mission says, or twice the search with its ways out and home."""
+    return [v.endurance_s or 2.0 * (mission.duration_s + STUB_RESERVE_S) for v in mission.fleet]
 
 
 def warm_up(mission: Mission, algorithm: str) -> bool:
@@ -76,11 +88,11 @@ def fly(
     )
     sessions = [Session(i + 1, settings=settings, now=0.0) for i in range(len(world.fleet))]
     vehicles = make_vehicles(mission, world)
-    text = dump(mission)
+    text = f"# Flown with --seed {seed}.\n" + dump(mission)
     folder.write_text(folder.mission, text)
     about = {
         "algorithm": world.algorithm, "seed": str(seed), "version": __version__, "vehicles": "stub",
-        "endurance_s": " ".join(f"{v.endurance_s or 2.0 * mission.duration_s:g}" for v in mission.fleet),
+        "endurance_s": " ".join(f"{s:g}" for s in endurance_s(mission)),
     }  # fmt: skip
     journal = Journal(folder, world, text, about)
     try:
@@ -105,6 +117,10 @@ def _each_tick(
         nonlocal due
         if orders.level > orders.obeyed:
             orders.obeyed = orders.level
+            if orders.level > 2:
+                raise StoppedError(
+                    "stopped at once, not everybody down; the recording ends here (replay reads it)"
+                )
             if orders.level == 1:
                 swarm.return_all("ordered by the operator", now)
             else:

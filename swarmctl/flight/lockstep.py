@@ -54,7 +54,8 @@ class Lockstep:
         self._swarm, self._sessions, self._vehicles = swarm, sessions, vehicles
         self._journal, self._track = journal, track
         self._rate = round(1.0 / interval_s, 9)
-        self._most_ticks = round((search_s + LONGEST_EXTRA_S) * self._rate)
+        highest = max(float(height) for height in swarm.heights_m)
+        self._most_ticks = round((search_s + LONGEST_EXTRA_S + 3.0 * highest) * self._rate)
         self.now = 0.0
 
     def run(self, each_tick: Callable[[float], None]) -> None:

@@ -51,14 +51,35 @@ class Outcome:
         """INTERFACE's exit code."""
         if self.aborted:
             return ABORTED
-        if self.swarm.refused:
+        never = self.swarm.search_began is None
+        if never and ("refused" in self.swarm.dropped or not self.track.airborne.any()):
             return REFUSED
         figures = self.summary("")
         close = figures["min_separation_m"]
         unsafe = figures["geofence_violations"] > 0 or (
             close is not None and close < self.mission.safety.separation_m
         )
-        return BROKEN if unsafe or any(v["outcome"] != "landed" for v in figures["per_vehicle"]) else DONE
+        return (
+            BROKEN
+            if never or unsafe or any(v["outcome"] != "landed" for v in figures["per_vehicle"])
+            else DONE
+        )
+
+    def complaints(self) -> list[str]:
+        """What went wrong, a line each."""
+        lines = [
+            f"vehicle {session.system}: {self._outcome(i, session)}"
+            for i, session in enumerate(self.sessions)
+            if self._outcome(i, session) != "landed"
+        ]
+        nearest, wanted = self.min_separation_m(), self.mission.safety.separation_m
+        if nearest is not None and nearest < wanted:
+            lines.append(
+                f"UNSAFE: two vehicles came within {nearest:.2f} m of each other; separation_m is {wanted:g}"
+            )
+        if self.geofence_violations():
+            lines.append("UNSAFE: a vehicle was outside the keep-in or inside a keep-out")
+        return lines
 
     def summary(self, run: str) -> dict[str, Any]:
         """The content of summary.json for the run folder ``run``."""
@@ -107,8 +128,9 @@ class Outcome:
             return 0.0
         times = self.track.times_s
         during = (times >= began) & (times < began + self.searched_s)
-        v_east, v_north = self.track.field("v_east")[during], self.track.field("v_north")[during]
-        return round(float(np.mean(np.hypot(v_east, v_north) < STANDING_MPS)), 6) if v_east.size else 0.0
+        aloft = self.track.airborne[during]
+        speed = np.hypot(self.track.field("v_east")[during], self.track.field("v_north")[during])
+        return round(float(np.mean(speed[aloft] < STANDING_MPS)), 6) if aloft.any() else 0.0
 
     def geofence_violations(self) -> int:
         """Vehicles × ticks with the true position outside the border or inside a keep-out."""
@@ -146,14 +168,12 @@ class Outcome:
         ]
 
     def _outcome(self, i: int, session: Session) -> str:
-        """landed, released, lost, crashed or refused."""
-        named = {Phase.LANDED: "landed", Phase.RELEASED: "released", Phase.LOST: "lost"}
-        if session.phase in named:
-            return named[session.phase]
-        ever_flew = bool(self.track.airborne[:, i].any())
-        if session.phase is Phase.FAILED and ever_flew:
-            return "crashed"
-        return "landed" if self.aborted and not ever_flew else "refused"
+        """landed, released, lost, crashed or refused; one that never had to fly stands, and so has landed."""
+        dropped = self.swarm.dropped[i]
+        if dropped is not None:
+            return dropped
+        flew = bool(self.track.airborne[:, i].any())
+        return "landed" if session.phase is Phase.LANDED or not flew else "lost"
 
 
 def _seconds_in_air(track: Track) -> float:

@@ -106,7 +106,7 @@ class Sensor(Part):
 
     range_m: Length = 200.0
     detection_probability: Probability = 1.0
-    false_alarms_per_hour: NotNegative = 0.0
+    false_alarms_per_hour: Annotated[float, Field(ge=0, le=3600)] = 0.0
     position_noise_m: NotNegative = 0.0
 
 
@@ -115,8 +115,8 @@ class Radio(Part):
 
     range_m: Annotated[float, Field(ge=0)] = 600.0
     loss: Probability = 0.0
-    delay_s: NotNegative = 0.0
-    bandwidth_bps: Positive | None = None
+    delay_s: Annotated[float, Field(ge=0, le=600)] = 0.0
+    bandwidth_bps: Annotated[float, Field(gt=0, le=1e12)] | None = None
 
 
 def _kind(value: Any) -> str | None:
@@ -214,7 +214,7 @@ class Safety(Part):
     separation_m: Length = 15.0
     fence_margin_m: Annotated[float, Field(ge=0, le=FARTHEST_M)] = 20.0
     max_acceleration_mps2: Annotated[float, Field(gt=0, le=50)] = 4.0
-    link_loss_s: Positive = 3.0
+    link_loss_s: Annotated[float, Field(ge=1.5, le=3600)] = 3.0
     battery_return_percent: Annotated[float, Field(ge=0, le=100)] = 25.0
     if_one_fails: Literal["abort", "continue"] = "abort"
     minimum_vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 1

@@ -11,10 +11,14 @@ from .model import Mission
 Known = Mapping[str, Mapping[str, float | str]]
 
 
-def check_parameters(mission: Mission, known: Known) -> list[Finding]:
+Limits = Mapping[str, Mapping[str, tuple[float, float]]]
+
+
+def check_parameters(mission: Mission, known: Known, limits: Limits | None = None) -> list[Finding]:
     """What is wrong with the algorithms named and their parameters.
 
     ``known`` holds each algorithm's parameters with their defaults: a parameter is text where its default is.
+    ``limits`` holds the least and the greatest value of those that are numbers.
     """
     planner = mission.planner
     found = []
@@ -27,8 +31,18 @@ def check_parameters(mission: Mission, known: Known) -> list[Finding]:
                 found.append(_unknown(path, "algorithm", algorithm, known))
             continue
         for name, value in given.items():
-            found += _parameter((*path, name), known[algorithm], algorithm, name, value)
+            path_to = (*path, name)
+            wrong = _parameter(path_to, known[algorithm], algorithm, name, value)
+            found += wrong or _range(path_to, (limits or {}).get(algorithm, {}).get(name), value)
     return found
+
+
+def _range(path: KeyPath, limits: tuple[float, float] | None, value: float | str) -> list[Finding]:
+    if limits is None or isinstance(value, str) or limits[0] <= value <= limits[1]:
+        return []
+    return [
+        Finding(path, f"must be from {limits[0]:g} to {limits[1]:g}, not {value:g}", "see swarmctl algos")
+    ]
 
 
 def _parameter(

@@ -115,7 +115,9 @@ class Scenario:
         low, high = self.regions.border.min(axis=0), self.regions.border.max(axis=0)
         # Centres lie a radius inside the area where it is wide enough, so that clusters are not cut in half.
         inset = np.minimum(wanted.radius_m, (high - low) / 4.0)
-        box = np.array([low[0] + inset[0], high[0] - inset[0], low[1] + inset[1], high[1] - inset[1]])
+        whole = np.array([low[0], high[0], low[1], high[1]])
+        shrink = np.array([inset[0], -inset[0], inset[1], -inset[1]])
+        box = np.stack((whole + shrink, whole))
         centres = np.zeros((wanted.clusters, 2))
         places, clusters = np.zeros((wanted.count, 2)), np.zeros(wanted.count, np.int64)
         calls.place_centres(

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from swarmctl.core import state
+from swarmctl.core import planners, stages, state
 from swarmctl.core.arrays import Records
 from swarmctl.core.world import Fences, Scene, World, make_settings
 
@@ -21,6 +21,7 @@ from . import rows
 from .errors import LogError
 from .mcap_read import Log, Rows
 
+HOMING = (stages.CLIMB, stages.TRANSIT, stages.OVER_PAD, stages.DESCEND)
 ONCE = ("/rules", "/fleet", "/settings", "/targets", "/fence")
 
 
@@ -98,11 +99,18 @@ def open_world(log: Log, algorithm: str | None = None) -> World:
     # Replay senses nothing: the targets are here for their number and for pictures.
     scene = Scene(targets, np.zeros(1, state.GRID), np.zeros(2, np.int64))
     recorded = about["algorithm"]
-    settings = found["/settings"] if algorithm in (None, recorded) else make_settings(str(algorithm), {})
+    if recorded not in planners.MODULES:
+        raise LogError(f"{log.path}: flown with {recorded}, which this version does not know")
+    settings = make_settings(algorithm or recorded, {})
+    if algorithm in (None, recorded):
+        settings = as_now(found["/settings"], settings.dtype, "/settings")
+    rules = as_now(found["/rules"], state.RULES, "/rules")
+    if not (rules["interval"][0] > 0 and min(rules["radio_delay"][0], rules["alarm_slots"][0]) >= 0):
+        raise LogError(f"{log.path}: /rules: a number is out of range; the recording was tampered with")
     return World(
         algorithm or recorded,
         as_now(found["/fleet"], state.VEHICLE, "/fleet"),
-        as_now(found["/rules"], state.RULES, "/rules"),
+        rules,
         scene,
         Fences(*(np.ascontiguousarray(e) for e in edges)),
         settings,
@@ -165,22 +173,39 @@ class _Replayer:
         if not self.begun and self.result.decisions == 0:
             world.prepare()
         if "/state" in pending and not self.other:
-            rows.load_state(world, pending["/state"].rows.tobytes())
+            self._check_state(tick, decided.time_s, pending["/state"].rows.tobytes())
         self._give_reports(as_now(pending["/observations"].rows, rows.OBSERVATION, "/observations"))
-        world.share(tick)
-        if not self.other:
-            world.beacons[tick % world.depth] = as_now(pending["/beacons"].rows, state.BEACON, "/beacons")
-        self._give_heard(as_now(pending["/heard"].rows, rows.HEARD, "/heard"), tick % world.depth)
-        world.decide(tick)
         self.begun = True
         self.good[:] = True
         self.result.decisions += len(world.fleet)
+        world.share(tick)
+        if not self.other:
+            beacons = as_now(pending["/beacons"].rows, state.BEACON, "/beacons")
+            self._compare("beacon", tick, decided.time_s, beacons, world.beacons[tick % world.depth])
+            world.beacons[tick % world.depth] = beacons
+        self._give_heard(as_now(pending["/heard"].rows, rows.HEARD, "/heard"), tick % world.depth)
+        world.decide(tick)
         recorded = as_now(decided.rows, rows.DECISION, "/decisions")
         apart = (recorded[name] - world.wishes[name] for name in ("v_east", "v_north"))
-        self.apart_mps += float(np.hypot(*apart).sum())
+        lengths = np.hypot(*apart)
+        self.apart_mps += float(lengths[np.isfinite(lengths)].sum())
         self._compare("plan", tick, decided.time_s, recorded, rows.decisions(world))
 
+    def _check_state(self, tick: int, time_s: float, recorded: bytes) -> None:
+        """Compare all chained memory with the recorded snapshot, then go on from that."""
+        world = self.world
+        if self.result.decisions and rows.dump_state(world) != recorded:
+            self.result.identical -= int(self.good.sum())
+            if self.result.first_difference is None:
+                self.result.first_difference = {"stage": "memory", "tick": tick, "time_s": time_s}
+        try:
+            rows.load_state(world, recorded)
+        except (ValueError, IndexError):
+            raise LogError("/state: recorded by a version with other memory; use that version") from None
+
     def _give_reports(self, recorded: Records) -> None:
+        self._require(recorded["vehicle"], len(self.world.fleet), "/observations")
+        self._require(recorded["id"], self.world.has.shape[1], "/observations")
         self.world.report_count[:] = 0
         for row in recorded:
             vehicle = int(row["vehicle"])
@@ -189,7 +214,15 @@ class _Replayer:
                 place[name] = row[name]
             self.world.report_count[vehicle] += 1
 
+    @staticmethod
+    def _require(values: Records, limit: int, topic: str) -> None:
+        """Raise LogError for an index that would lead a kernel out of its arrays."""
+        if len(values) and not (values.min() >= 0 and values.max() < limit):
+            raise LogError(f"{topic}: a number is out of range; the recording was tampered with")
+
     def _give_heard(self, recorded: Records, slot: int) -> None:
+        for name in ("receiver", "sender"):
+            self._require(recorded[name], len(self.world.fleet), "/heard")
         senders: dict[int, list[int]] = defaultdict(list)
         for receiver, sender in recorded.tolist():
             senders[receiver].append(sender)
@@ -199,6 +232,7 @@ class _Replayer:
 
     def _steer(self, message: Rows, recorded: Records) -> None:
         world = self.world
+        self._check_stages(message, recorded["stage"])
         world.errands["stage"] = recorded["stage"]
         world.orders[:] = recorded["ordered_home"]
         if world.orders.any():
@@ -210,6 +244,22 @@ class _Replayer:
         same = self._compare("guard", message.tick, message.time_s, recorded, computed)
         self.result.setpoints_identical += same
 
+    def _check_stages(self, message: Rows, recorded: Records) -> None:
+        """Homing's own steps are outputs: where the recording shows one, the last tick must have led there."""
+        wrong = np.isin(recorded, HOMING) & (recorded != self.world.errands["stage"])
+        wrong &= np.isin(self.world.errands["stage"], (stages.WAIT, *HOMING))
+        self.good &= ~wrong
+        if wrong.any() and self.result.first_difference is None:
+            i = int(np.flatnonzero(wrong)[0])
+            self.result.first_difference = {
+                "stage": "homing",
+                "tick": message.tick,
+                "time_s": message.time_s,
+                "vehicle": i + 1,
+                "recorded": stages.NAMES[int(recorded[i])],
+                "recomputed": stages.NAMES[int(self.world.errands["stage"][i])],
+            }
+
     def _compare(self, stage: str, tick: int, time_s: float, recorded: Records, computed: Records) -> int:
         """Count the rows that are equal bit for bit, and keep the first that is not."""
         if recorded.tobytes() == computed.tobytes():
@@ -218,7 +268,8 @@ class _Replayer:
         self.good &= same
         for name in computed.dtype.names or ():
             if name.endswith(("v_east", "v_north")):
-                difference = float(np.nanmax(np.abs(recorded[name] - computed[name]), initial=0.0))
+                apart = np.abs(recorded[name] - computed[name])
+                difference = float(apart[np.isfinite(apart)].max(initial=0.0))
                 self.result.largest_difference_mps = max(self.result.largest_difference_mps, difference)
         if self.result.first_difference is None and not same.all():
             i = int(np.flatnonzero(~same)[0])

@@ -47,6 +47,7 @@ _CARRIED = (
     "heard_count",
     "errands",
     "setpoints",
+    "sent",
     "wishes",
 )
 

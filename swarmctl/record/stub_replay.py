@@ -17,6 +17,7 @@ from swarmctl.mavlink.codec import Decoder, Frame
 from swarmctl.mavlink.dialect import mav
 
 from . import mcap_read
+from .errors import LogError
 from .folder import RunFolder
 from .replay import open_world
 from .tlog_read import read_frames
@@ -74,7 +75,9 @@ def replay_stub(folder: RunFolder, make_vehicles: MakeVehicles) -> Compared:
     interval = float(world.rules[0]["interval"])
     about = yaml.safe_load(log.attachments.get("mission.yaml", "{}"))
     origin = about["origin"]
-    endurance = [float(s) for s in log.metadata["flight"]["endurance_s"].split()]
+    endurance = [float(s) for s in log.metadata["flight"].get("endurance_s", "").split()]
+    if len(endurance) != len(world.fleet):
+        raise LogError(f"{folder.mcap}: does not say how long its vehicles can fly")
     vehicles = make_vehicles(
         world.fleet, (origin["lat"], origin["lon"], origin["alt_m"]), endurance, interval
     )
@@ -87,7 +90,11 @@ def replay_stub(folder: RunFolder, make_vehicles: MakeVehicles) -> Compared:
             orders[tick].append(frame)
         elif frame.message_id == POSITION:
             recorded[tick, frame.system] = _position(frame)
-    return _compare(recorded, _fly(vehicles, orders, last, interval))
+    reported = _fly(vehicles, orders, last, interval)
+    if log.truncated:  # the last tick may have been cut in two
+        recorded = {key: value for key, value in recorded.items() if key[0] < last}
+        reported = {key: value for key, value in reported.items() if key[0] < last}
+    return _compare(recorded, reported)
 
 
 def _position(frame: Frame) -> tuple[int, ...]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import shapely
@@ -49,7 +50,7 @@ def fences(area: Box, keep_outs: Sequence[Box] = (), margin: float = 0.0) -> Fen
     return Fences(raw, plan, guard)
 
 
-def fleet_of(places: Sequence[Place], headings: Sequence[float] = (), **values: float) -> Records:
+def fleet_of(places: Sequence[Place], headings: Sequence[float] = (), **values: Any) -> Records:
     """Vehicles (V,) with pads at ``places``; ``headings`` in degrees from east to north."""
     fleet = np.zeros(len(places), state.VEHICLE)
     for name, value in {**VEHICLE, **values}.items():
@@ -70,7 +71,7 @@ def rules_of(**values: float) -> Records:
 
 def direction(degrees: float) -> Place:
     """The unit vector at an angle from east to north, exact for multiples of 90 degrees."""
-    exact = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
+    exact: dict[float, Place] = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
     angle = math.radians(degrees)
     return exact.get(degrees % 360) or (math.cos(angle), math.sin(angle))
 
@@ -90,7 +91,8 @@ def world_of(
 
 PER_VEHICLE = ("poses", "memory", "knowledge", "contacts", "has", "told", "reports", "report_count", "wishes")
 REST = (
-    "alarms", "found", "beacons", "heard", "heard_count", "errands", "paths", "wants", "setpoints", "orders",
+    "alarms", "found", "beacons", "heard", "heard_count", "errands", "paths", "wants", "sent", "setpoints",
+    "orders",
 )  # fmt: skip
 
 

@@ -87,7 +87,7 @@ def fly(
     orders = flight.Orders()
 
     def make(mission: Mission, world: World) -> Any:
-        endurance = [2.0 * mission.duration_s] * len(mission.fleet)
+        endurance = flight.endurance_s(mission)
         interval = 1.0 / mission.setpoints.rate_hz
         return hobble(configured_fleet(world.fleet, ORIGIN, endurance, interval))
 

@@ -117,7 +117,10 @@ def test_summary_figures_agree_with_one_another(flown: Flown) -> None:
     known = [t for t in times if t is not None]
     assert known == sorted(known)
     assert all(0.0 <= t <= 70.0 for t in known)
-    most, together = max(v["detected"] for v in s["per_vehicle"]), sum(v["detected"] for v in s["per_vehicle"])
+    most, together = (
+        max(v["detected"] for v in s["per_vehicle"]),
+        sum(v["detected"] for v in s["per_vehicle"]),
+    )
     assert most <= s["detected"] <= together
     assert s["run"] == str(flown.folder.path)
 
@@ -134,9 +137,7 @@ def test_limits_recomputed_from_the_tlog_are_those_of_the_summary(flown: Flown, 
         assert steps.sum() == pytest.approx(vehicle["distance_m"], rel=0.02)
 
 
-def test_the_tlog_is_whole_and_its_counts_are_those_of_the_summary(
-    flown: Flown, messages: list[Any]
-) -> None:
+def test_the_tlog_is_whole_and_its_counts_are_those_of_the_summary(flown: Flown, messages: list[Any]) -> None:
     size = sum(8 + len(m.get_msgbuf()) for m in messages)
     assert flown.folder.tlog.stat().st_size == size
     assert not any(m.get_type() == "BAD_DATA" for m in messages)

@@ -6,6 +6,7 @@ vector of the rules unless a test asks for it, in a wide field whose fence is ou
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ class Situation:
     def __init__(
         self, algorithm: str, places: Sequence[Place], headings: Sequence[float] = (),
         targets: Sequence[Place] = (), *, area: Box = FIELD, keep_outs: Sequence[Box] = (), margin: float = 0.0,
-        ideal: bool = True, random: float = 0.0, **values: float,
+        ideal: bool = True, random: float = 0.0, **values: Any,
     ) -> None:  # fmt: skip
         known = {p.name for p in planners.module(algorithm).PARAMETERS}
         settings = {k: v for k, v in values.items() if k in known}

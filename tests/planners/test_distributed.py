@@ -20,7 +20,7 @@ from .situation import Situation
 AREA: Box = (0.0, 3000.0, 0.0, 3000.0)
 KEEP_OUT: Box = (1200.0, 1500.0, 1300.0, 1500.0)
 RADIO = 600.0
-I, J, K = 0, 1, 2  # J is perturbed, I must not notice; K may be in range of either
+ME, OTHER = 0, 1  # the other is perturbed, I must not notice; the third may be in range of either
 DEAF = ("bounce", "levy", "sweep")  # these use no radio at all
 OWN = ("wishes", "memory", "knowledge", "contacts", "has")
 
@@ -48,36 +48,36 @@ def in_mid_flight(algorithm: str, rng: np.random.Generator) -> Situation:
 
 
 def perturb(world: World, rng: np.random.Generator) -> None:
-    """Make everything about J another: its memory, its knowledge, what it was told."""
+    """Make everything about the other vehicle different: its memory, its knowledge, what it was told."""
     for name in world.memory.dtype.names or ():
         kind = world.memory.dtype[name].kind
-        world.memory[name][J] = rng.integers(0, 4) if kind == "i" else rng.uniform(-500.0, 3000.0)
-    world.memory["heading_east"][J], world.memory["heading_north"][J] = 0.6, -0.8
+        world.memory[name][OTHER] = rng.integers(0, 4) if kind == "i" else rng.uniform(-500.0, 3000.0)
+    world.memory["heading_east"][OTHER], world.memory["heading_north"][OTHER] = 0.6, -0.8
     knows = rng.permutation(len(world.scene.targets))[: rng.integers(1, 60)]
-    world.has[J], world.told[J] = 0, 0
-    world.has[J, knows] = 1
+    world.has[OTHER], world.told[OTHER] = 0, 0
+    world.has[OTHER, knows] = 1
     for slot, serial in enumerate(knows):
         target = world.scene.targets[serial]
-        world.contacts[J, slot] = (serial, target["east"], target["north"])
-    world.knowledge["known"][J] = len(knows)
-    world.poses["v_east"][J], world.poses["v_north"][J] = rng.uniform(-25.0, 25.0, 2)
+        world.contacts[OTHER, slot] = (serial, target["east"], target["north"])
+    world.knowledge["known"][OTHER] = len(knows)
+    world.poses["v_east"][OTHER], world.poses["v_north"][OTHER] = rng.uniform(-25.0, 25.0, 2)
 
 
 def put_at_range(world: World, low: float, high: float, rng: np.random.Generator) -> bool:
-    """Put J somewhere so far from I; False if chance finds no such place in the area."""
+    """Put the other vehicle somewhere so far from me; False if chance finds no such place in the area."""
     for _ in range(40):
         place = rng.uniform(0.0, 3000.0, 2)
-        if low < np.hypot(place[0] - world.poses["east"][I], place[1] - world.poses["north"][I]) <= high:
-            world.poses["east"][J], world.poses["north"][J] = place
+        if low < np.hypot(place[0] - world.poses["east"][ME], place[1] - world.poses["north"][ME]) <= high:
+            world.poses["east"][OTHER], world.poses["north"][OTHER] = place
             return True
     return False
 
 
 def decided(s: Situation) -> dict[str, bytes]:
-    """One more period, and what I then knows, remembers and wants."""
+    """One more period, and what I then know, remember and want."""
     s.plan()
     s.tick -= 1
-    return {name: getattr(s.world, name)[I].tobytes() for name in OWN}
+    return {name: getattr(s.world, name)[ME].tobytes() for name in OWN}
 
 
 @pytest.mark.parametrize("algorithm", planners.MODULES)

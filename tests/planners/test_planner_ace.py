@@ -1,6 +1,7 @@
 """ACE: each mechanism in a situation where it decides."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ HERE = (0.0, 0.0)
 FAR = (0.0, 5000.0)
 
 
-def mowing(heading: float = 90.0, **values: float) -> Situation:
+def mowing(heading: float = 90.0, **values: Any) -> Situation:
     """A vehicle at HERE that just began to mow: it sees two targets close by."""
     return Situation("ace", [HERE], [heading], crowd(HERE, 2), **values).plan()
 
@@ -138,7 +139,7 @@ def test_a_shift_that_meets_the_fence_ends_the_cluster() -> None:
     assert 990.0 + 25.0 * math.sin(math.radians(s.heading())) < 1000.0
 
 
-def meeting(found: tuple[int, int], heading: float = 90.0, **values: float) -> Situation:
+def meeting(found: tuple[int, int], heading: float = 90.0, **values: Any) -> Situation:
     """Two vehicles that mow one cluster, having found so many each, come into each other's range."""
     targets = [*crowd((0.0, 0.0), found[0], 20.0), *crowd((900.0, 0.0), found[1], 20.0)]
     s = Situation("ace", [(0.0, 0.0), (900.0, 0.0)], [heading] * 2, targets, random=1.0, **values).plan()

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ AREA: Box = (0.0, 1000.0, 0.0, 1000.0)
 KEEP_OUT: Box = (400.0, 600.0, 400.0, 600.0)
 
 
-def at_fence(algorithm: str = "bounce", count: int = 200, **values: float) -> Situation:
+def at_fence(algorithm: str = "bounce", count: int = 200, **values: Any) -> Situation:
     """Vehicles that fly against the eastern border, too near to go on for another period."""
     return Situation(algorithm, [(990.0, 500.0)] * count, [20.0] * count, area=AREA, **values).plan()
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,7 +93,7 @@ def test_unit_terms_pull_alike_from_any_distance_metric_ones_in_proportion(near_
 AWAY = (3000.0, 1000.0)
 
 
-def left(count: int = 1, keep_outs: Sequence[Box] = (), **values: float) -> Situation:
+def left(count: int = 1, keep_outs: Sequence[Box] = (), **values: Any) -> Situation:
     """Vehicles that saw NEARER and FURTHER at tick 0 and now fly on AWAY, eastwards, out of radio range."""
     s = Situation(
         "fco",

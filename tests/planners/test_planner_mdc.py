@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ FOUR = [*crowd((190.0, 0.0), 3), (0.0, 190.0)]
 ALGORITHMS = ("mdc", "dpso-u")
 
 
-def after_best(algorithm: str = "mdc", **values: float) -> Situation:
+def after_best(algorithm: str = "mdc", **values: Any) -> Situation:
     """A vehicle that saw four targets at HERE and stands ASIDE, heading east."""
     return Situation(algorithm, [HERE], [0.0], FOUR, **values).plan().put(0, ASIDE, 0.0)
 

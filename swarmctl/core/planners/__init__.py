@@ -23,6 +23,11 @@ def module(name: str) -> ModuleType:
     return import_module(f"{__name__}.{MODULES[name]}")
 
 
+def limits() -> dict[str, dict[str, tuple[float, float]]]:
+    """Every algorithm with its parameters' least and greatest values."""
+    return {name: {p.name: (p.low, p.high) for p in module(name).PARAMETERS} for name in MODULES}
+
+
 def catalogue() -> dict[str, dict[str, float | str]]:
     """Every algorithm with its parameters' defaults."""
     return {name: {p.name: p.default for p in module(name).PARAMETERS} for name in MODULES}

@@ -16,10 +16,10 @@ from .parameters import Parameter
 
 TITLE = "maximum density convergence: gather where targets are densest"
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w_A, weight of the last direction", "eqs. 7, 8"),
-    Parameter("personal", 0.3, "C_p, pull to the best place of this visit", "eq. 7"),
-    Parameter("global", 0.3, "C_g, pull to the best place among neighbours on targets", "eq. 8"),
-    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 7, 8"),
+    Parameter("inertia", 0.4, "w_A, weight of the last direction", "eqs. 7, 8", 0.0, 100.0),
+    Parameter("personal", 0.3, "C_p, pull to the best place of this visit", "eq. 7", 0.0, 100.0),
+    Parameter("global", 0.3, "C_g, pull to the best place among neighbours on targets", "eq. 8", 0.0, 100.0),
+    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 7, 8", 0.0, 100.0),
     Parameter("jump_out_s", 15.0, "leave after so long without a better place", "section VII-B"),
     Parameter(
         "return_s", 200.0, "fly back to the best place after so long without a visit", "section IV (3)"

@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 
 class Parameter(NamedTuple):
-    """One number a planner can be set with; ``source`` is the paper's equation or section, or "ours"."""
+    """One number a planner can be set with, from ``low`` to ``high``; ``source``: the paper's equation, or "ours"."""
 
     name: str
     default: float
     meaning: str
     source: str
+    low: float = 0.0
+    high: float = 1e6
