@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .flight.lockstep import Vehicles
     from .mission.model import Mission
 
-BAD_INPUT, DIFFERS, FAILED = 2, 5, 1
+BAD_INPUT, DIFFERS, FAILED, REFUSED = 2, 5, 1, 3
+FASTEST = 100.0
 PathArgument = click.Path(path_type=Path)
 
 
@@ -36,18 +37,41 @@ def say(text: str) -> None:
 @contextmanager
 def plain_errors() -> Iterator[None]:
     """Turn what bad input raises into a message and an exit code; nobody sees a traceback for it."""
+    from .flight.live import RefusedError
     from .flight.swarm import FlightError
     from .mission.errors import MissionError
     from .record.errors import RecordError
+    from .vehicle.addresses import AddressError
 
     try:
         yield
-    except (MissionError, RecordError) as error:
+    except (MissionError, RecordError, AddressError) as error:
         say(str(error))
         sys.exit(BAD_INPUT)
+    except RefusedError as error:
+        say(str(error))
+        sys.exit(REFUSED)
     except FlightError as error:
         say(f"the flight failed: {error}")
         sys.exit(FAILED)
+
+
+class SpeedType(click.ParamType):  # type: ignore[type-arg]
+    """``max``, which becomes None, or a factor."""
+
+    name = "speed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | None:
+        """Read it; anything else is a bad command line."""
+        if value in (None, "max"):
+            return None
+        try:
+            factor = float(value)
+        except ValueError:
+            factor = 0.0
+        if not 0.0 < factor <= FASTEST:
+            self.fail(f"{value!r} is neither max nor a factor up to {FASTEST:g}", param, ctx)
+        return factor
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -72,27 +96,60 @@ mission_option = click.option(
     "--seed", type=click.IntRange(0, 2**62), default=1, show_default=True, help="Targets, headings, planners."
 )
 @click.option("--duration", type=float, help="Length of the search in seconds.")
-@click.option("--speed", type=click.Choice(["max"]), default="max", help="max: lockstep, as fast as it goes.")
+@click.option(
+    "--speed",
+    type=SpeedType(),
+    metavar="max|FACTOR",
+    help="max: lockstep, as fast as it goes (default without --connect); a factor: live, so many times real time.",
+)
+@click.option(
+    "--connect",
+    "urls",
+    multiple=True,
+    metavar="URL",
+    help="Fly the vehicles there, e.g. udpin://0.0.0.0:14540-14545.",
+)
+@click.option(
+    "--connect-timeout",
+    type=click.FloatRange(0.1),
+    default=20.0,
+    show_default=True,
+    help="Seconds to wait for them.",
+)
 @click.option("--out", type=PathArgument, help="The run's folder (default: runs/DATE-TIME-ALGO).")
 @click.option("--json", "as_json", is_flag=True, help="Print summary.json, and nothing else, on stdout.")
 @click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
 def fly(
     mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
-    speed: str, out: Path | None, as_json: bool, yes: bool,
+    speed: float | None, urls: tuple[str, ...], connect_timeout: float, out: Path | None, as_json: bool, yes: bool,
 ) -> None:  # fmt: skip
-    """Fly a mission with stub vehicles in lockstep, over real MAVLink bytes, and record it."""
+    """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
     with plain_errors():
+        from . import live_cli
         from .flight import fly as flight
+        from .mission.launch import as_found
 
         mission = _load(mission_file, algorithm, vehicles, duration)
-        _refuse_what_stubs_cannot(mission)
+        if urls:
+            mission = as_found(mission)
+        else:
+            _refuse_what_stubs_cannot(mission)
         name = mission.planner.algorithm
         folder = flight.default_folder(out, name)
         orders = flight.Orders()
         with _interruptible(orders):
             _warm_up(mission, name)
-            say(f"flying {len(mission.fleet)} stub vehicles with {name}, seed {seed}, into {folder.path}")
-            outcome = flight.fly(mission, seed, folder, _make_stubs, orders, _progress(mission))
+            what = "vehicles" if urls else "stub vehicles"
+            say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
+            report = _progress(mission)
+            if urls:
+                outcome = live_cli.fly_connected(
+                    mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, report
+                )
+            elif speed is not None:
+                outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, report)
+            else:
+                outcome = flight.fly(mission, seed, folder, _make_stubs, orders, report)
             summary = flight.write_results(outcome, folder)
         if as_json:
             click.echo(json.dumps(summary, indent=2, allow_nan=False))

@@ -11,6 +11,7 @@ from enum import Enum
 import numpy as np
 
 from swarmctl.core import calls, stages
+from swarmctl.core.wire import COLUMNS
 from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
@@ -63,7 +64,7 @@ class Swarm:
         self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
         origin = mission.origin
         self._origin = (origin.lat, origin.lon, origin.alt_m)
-        self._wire = np.zeros((len(sessions), 6))
+        self._wire = np.zeros((len(sessions), len(COLUMNS)))
         self._period = round(mission.planner.period_s * mission.setpoints.rate_hz)
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
         self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
@@ -95,7 +96,7 @@ class Swarm:
     def tick(self, k: int, now: float) -> None:
         """One setpoint tick at flight time ``now``; the sessions have taken in what arrived by then."""
         self._take_events(now)
-        self._read_telemetry()
+        self._read_telemetry(now)
         self._go_on(k, now)
         self._follow_stages()
         ahead = k - self._began_at
@@ -127,10 +128,11 @@ class Swarm:
         if safety.if_one_fails == "abort" or left < safety.minimum_vehicles:
             self.return_all(event.text, now)
 
-    def _read_telemetry(self) -> None:
+    def _read_telemetry(self, now: float) -> None:
         for i, session in enumerate(self._sessions):
             t = session.telemetry
-            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up)
+            age = now - t.received_at if t.positioned else 0.0
+            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age)
         calls.read_poses(self._wire, self._world.poses, *self._origin)
 
     def _go_on(self, k: int, now: float) -> None:

@@ -1,0 +1,138 @@
+"""One live flight from mission and addresses to run folder."""
+
+import asyncio
+import signal
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarmctl.core import calls
+from swarmctl.core.arrays import Floats
+from swarmctl.mission.dump import dump
+from swarmctl.mission.model import Mission
+from swarmctl.mission.scenario import Scenario
+from swarmctl.record.folder import RunFolder
+from swarmctl.vehicle.addresses import Address
+from swarmctl.vehicle.session import Session
+
+from . import clock
+from .fly import Orders, Report, about_flight, obey_and_report, session_settings
+from .journal import Journal
+from .live import FlightClock, LiveLink, LiveLoop, RefusedError
+from .results import Outcome
+from .swarm import Swarm
+from .track import Track
+
+LIVE_FLUSH_S = 1.0
+STUB_LATENCY_S = 0.1
+"""From a position's measurement to the setpoint's effect, on stubs of this machine."""
+
+
+@dataclass(frozen=True)
+class LiveOptions:
+    """How to reach the vehicles, and what they are."""
+
+    addresses: Sequence[Address]
+    speed: float = 1.0
+    connect_timeout_s: float = 20.0
+    own_stubs: bool = False  #: our own stub vehicles: they fly as the mission says
+    confirm: Callable[[Sequence[Session]], Awaitable[bool]] | None = None  #: asked before anything is armed
+
+
+async def fly_live(
+    mission: Mission, seed: int, folder: RunFolder, options: LiveOptions, orders: Orders, report: Report
+) -> Outcome:
+    """Fly ``mission`` live and record it.  Raises RefusedError (nothing armed), FlightError, RunFolderError."""
+    link = LiveLink(FlightClock(options.speed))
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, orders.interrupt)
+    try:
+        await link.connect(
+            options.addresses, len(mission.fleet), session_settings(mission), options.connect_timeout_s
+        )
+        await link.prepare()
+        if options.confirm is not None and not await _ask(link, options.confirm):
+            raise RefusedError("not confirmed: nothing was armed")
+        return await _fly_prepared(mission, seed, folder, options, orders, report, link)
+    finally:
+        link.close()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)
+
+
+async def _ask(link: LiveLink, confirm: Callable[[Sequence[Session]], Awaitable[bool]]) -> bool:
+    """Ask, and keep the links alive while somebody thinks."""
+    answer = asyncio.ensure_future(confirm(link.sessions))
+    while not answer.done():
+        link.poll()
+        await asyncio.sleep(0.05)
+    return answer.result()
+
+
+def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:
+    """Where the vehicles stand, (V, 2) local metres."""
+    origin = mission.origin
+    places = [
+        calls.to_local(
+            s.telemetry.lat_e7 * 1e-7, s.telemetry.lon_e7 * 1e-7, origin.lat, origin.lon, origin.alt_m
+        )
+        for s in sessions
+    ]
+    return np.array(places)
+
+
+async def _fly_prepared(
+    mission: Mission,
+    seed: int,
+    folder: RunFolder,
+    options: LiveOptions,
+    orders: Orders,
+    report: Report,
+    link: LiveLink,
+) -> Outcome:
+    """Build the world about where the vehicles stand, and fly."""
+    as_found = stands(mission, link.sessions) if mission.launch == "as_found" else None
+    scenario = Scenario(mission, ideal=False, stands=as_found)
+    world = scenario.world(seed)
+    describe_vehicles(world.fleet, link.sessions, options.own_stubs)
+    text = dump(mission)
+    folder.write_text(folder.mission, text)
+    journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
+    try:
+        link.record(journal)
+        swarm = Swarm(mission, world, link.sessions, journal)
+        track = Track(len(link.sessions))
+        interval = 1.0 / mission.setpoints.rate_hz
+        began = clock.wall_s()
+        flight = LiveLoop(link, swarm, lambda: world.poses, journal, track, interval)
+        await flight.run(obey_and_report(swarm, world, orders, report))
+    finally:
+        journal.close()
+    wall = clock.wall_s() - began
+    return Outcome(
+        mission,
+        world,
+        scenario.regions,
+        swarm,
+        link.sessions,
+        track,
+        seed,
+        wall,
+        orders.level > 0,
+        options.speed,
+    )
+
+
+def describe_vehicles(
+    fleet: np.ndarray[tuple[int], np.dtype[np.void]], sessions: Sequence[Session], own: bool
+) -> None:
+    """Give the guard what it needs to know of each vehicle: how it brakes, and how late it acts."""
+    for row, session in zip(fleet, sessions, strict=True):
+        if own or session.adapter is None:
+            row["latency"] = STUB_LATENCY_S
+            continue
+        limits = session.adapter.limits
+        row["braking"] = min(float(row["braking"]), limits.braking_mps2)
+        row["latency"] = limits.latency_s
