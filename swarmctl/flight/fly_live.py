@@ -4,11 +4,13 @@ import asyncio
 import signal
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from swarmctl.core import calls
 from swarmctl.core.arrays import Floats
+from swarmctl.core.world import World
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
@@ -24,6 +26,7 @@ from .results import Outcome
 from .swarm import Swarm
 from .track import Track
 
+T = TypeVar("T")
 LIVE_FLUSH_S = 1.0
 STUB_LATENCY_S = 0.1
 """From a position's measurement to the setpoint's effect, on stubs of this machine."""
@@ -53,7 +56,7 @@ async def fly_live(
             options.addresses, len(mission.fleet), session_settings(mission), options.connect_timeout_s
         )
         await link.prepare()
-        if options.confirm is not None and not await _ask(link, options.confirm):
+        if options.confirm is not None and not await _meanwhile(link, options.confirm(link.sessions)):
             raise RefusedError("not confirmed: nothing was armed")
         return await _fly_prepared(mission, seed, folder, options, orders, report, link)
     finally:
@@ -62,13 +65,13 @@ async def fly_live(
             loop.remove_signal_handler(number)
 
 
-async def _ask(link: LiveLink, confirm: Callable[[Sequence[Session]], Awaitable[bool]]) -> bool:
-    """Ask, and keep the links alive while somebody thinks."""
-    answer = asyncio.ensure_future(confirm(link.sessions))
-    while not answer.done():
+async def _meanwhile(link: LiveLink, work: Awaitable[T]) -> T:
+    """Await ``work``, and keep the links alive until it is done."""
+    task = asyncio.ensure_future(work)
+    while not task.done():
         link.poll()
-        await asyncio.sleep(0.05)
-    return answer.result()
+        await asyncio.sleep(0.02)
+    return task.result()
 
 
 def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:
@@ -93,9 +96,7 @@ async def _fly_prepared(
     link: LiveLink,
 ) -> Outcome:
     """Build the world about where the vehicles stand, and fly."""
-    as_found = stands(mission, link.sessions) if mission.launch == "as_found" else None
-    scenario = Scenario(mission, ideal=False, stands=as_found)
-    world = scenario.world(seed)
+    scenario, world = await _meanwhile(link, asyncio.to_thread(_build, mission, seed, link.sessions))
     describe_vehicles(world.fleet, link.sessions, options.own_stubs)
     text = dump(mission)
     folder.write_text(folder.mission, text)
@@ -123,6 +124,12 @@ async def _fly_prepared(
         orders.level > 0,
         options.speed,
     )
+
+
+def _build(mission: Mission, seed: int, sessions: Sequence[Session]) -> tuple[Scenario, World]:
+    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
+    scenario = Scenario(mission, ideal=False, stands=as_found)
+    return scenario, scenario.world(seed)
 
 
 def describe_vehicles(
