@@ -185,6 +185,20 @@ def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
 
 
 @main.command()
+@click.argument("run", type=PathArgument)
+@click.argument("order", type=click.Choice(["hold", "resume", "return", "land"]))
+def control(run: Path, order: str) -> None:
+    """Speak to the live flight that records into RUN."""
+    from .flight.control import ControlError, send
+
+    try:
+        click.echo(send(run, [order]))
+    except ControlError as error:
+        say(str(error))
+        sys.exit(BAD_INPUT)
+
+
+@main.command()
 @mission_option
 def check(mission_file: Path | None) -> None:
     """Validate a mission and say what it is; arm nothing."""

@@ -3,6 +3,7 @@
 import asyncio
 import signal
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -19,6 +20,7 @@ from swarmctl.vehicle.addresses import Address
 from swarmctl.vehicle.session import Session
 
 from . import clock
+from .control import ControlError, ControlServer
 from .fly import Orders, Report, about_flight, obey_and_report, session_settings
 from .journal import Journal
 from .live import FlightClock, LiveLink, LiveLoop, RefusedError
@@ -101,16 +103,15 @@ async def _fly_prepared(
     text = dump(mission)
     folder.write_text(folder.mission, text)
     journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
-    try:
+    swarm = Swarm(mission, world, link.sessions, journal)
+    track = Track(len(link.sessions))
+    control = ControlServer(folder.path, lambda words: obey(words, swarm, link.clock.now()))
+    flight = LiveLoop(link, swarm, lambda: world.poses, journal, track, 1.0 / mission.setpoints.rate_hz)
+    with closing(journal), closing(control):
         link.record(journal)
-        swarm = Swarm(mission, world, link.sessions, journal)
-        track = Track(len(link.sessions))
-        interval = 1.0 / mission.setpoints.rate_hz
+        await control.start()
         began = clock.wall_s()
-        flight = LiveLoop(link, swarm, lambda: world.poses, journal, track, interval)
         await flight.run(obey_and_report(swarm, world, orders, report))
-    finally:
-        journal.close()
     wall = clock.wall_s() - began
     return Outcome(
         mission,
@@ -130,6 +131,20 @@ def _build(mission: Mission, seed: int, sessions: Sequence[Session]) -> tuple[Sc
     as_found = stands(mission, sessions) if mission.launch == "as_found" else None
     scenario = Scenario(mission, ideal=False, stands=as_found)
     return scenario, scenario.world(seed)
+
+
+def obey(words: list[str], swarm: Swarm, now: float) -> str:
+    """Carry out one order of ``swarmctl control``.  Raises ControlError for what is none."""
+    orders: dict[str, Callable[[], None]] = {
+        "hold": lambda: swarm.hold(now),
+        "resume": lambda: swarm.resume(now),
+        "return": lambda: swarm.return_all("ordered by the operator", now),
+        "land": lambda: swarm.land_all(now),
+    }
+    if len(words) != 1 or words[0] not in orders:
+        raise ControlError(f"{' '.join(words)!r} is no order ({', '.join(orders)})")
+    orders[words[0]]()
+    return f"{words[0]} at {now:.1f} s; now {'holding' if swarm.held else swarm.part.value}"
 
 
 def describe_vehicles(

@@ -57,6 +57,7 @@ class Swarm:
         self.part = Part.PREPARING
         self.search_began: float | None = None
         self.refused = False
+        self.held = False
         self.decisions = 0
         self.messages: list[list[str]] = [[] for _ in sessions]  #: what happened to each vehicle, for people
         self.in_range_total = 0
@@ -80,12 +81,31 @@ class Swarm:
         """Send everyone home who searches; before the search, land everyone where it is."""
         if self.part in (Part.RETURNING, Part.OVER):
             return
+        self.resume(now)
         self._journal.event(now, 0, "return", why)
         if self.part is not Part.SEARCHING:
             self._land_airborne()
         else:
             self._world.orders[:] = self._world.errands["stage"] == stages.SEARCH
         self.part = Part.RETURNING
+
+    def hold(self, now: float) -> None:
+        """Everybody stands still in the air; the search's clock stands still too."""
+        if self.part is Part.SEARCHING:
+            self.held = True
+            self._journal.event(now, 0, "hold", "ordered by the operator")
+            self._change_stage(stages.SEARCH, stages.HOLD)
+
+    def resume(self, now: float) -> None:
+        """Go on searching after `hold`."""
+        if self.held:
+            self.held = False
+            self._journal.event(now, 0, "resume", "ordered by the operator")
+            self._change_stage(stages.HOLD, stages.SEARCH)
+
+    def _change_stage(self, old: int, new: int) -> None:
+        stage = self._world.errands["stage"]
+        stage[stage == old] = new
 
     def land_all(self, now: float) -> None:
         """Land everyone where it is, at once."""
@@ -99,8 +119,9 @@ class Swarm:
         self._read_telemetry(now)
         self._go_on(k, now)
         self._follow_stages()
+        self._began_at += self.held
         ahead = k - self._began_at
-        if self.part is Part.SEARCHING and ahead % self._period == 0:
+        if self.part is Part.SEARCHING and not self.held and ahead % self._period == 0:
             if ahead // self._period < self._planner_ticks:
                 self._plan(ahead // self._period, now)
             else:
