@@ -8,7 +8,7 @@ import json
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -124,7 +124,7 @@ def fly(
     speed: float | None, urls: tuple[str, ...], connect_timeout: float, out: Path | None, as_json: bool, yes: bool,
 ) -> None:  # fmt: skip
     """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
-    with plain_errors():
+    with plain_errors(), ExitStack() as ending:
         from . import live_cli
         from .flight import fly as flight
         from .mission.launch import as_found
@@ -137,6 +137,7 @@ def fly(
         name = mission.planner.algorithm
         folder = flight.default_folder(out, name)
         orders = flight.Orders()
+        ending.callback(folder.remove_if_empty)
         with _interruptible(orders):
             _warm_up(mission, name)
             what = "vehicles" if urls else "stub vehicles"
