@@ -8,7 +8,7 @@ import json
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 BAD_INPUT, FAILED, REFUSED, ABORTED, DIFFERS = 2, 1, 3, 4, 5
 LEAST_MARGIN_M = 2.0
 MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
+FASTEST = 100.0
 PathArgument = click.Path(path_type=Path)
 
 
@@ -42,10 +43,11 @@ def plain_errors() -> Iterator[None]:
     from .flight.swarm import FlightError, RefusedError
     from .mission.errors import MissionError
     from .record.errors import RecordError
+    from .vehicle.addresses import AddressError
 
     try:
         yield
-    except (MissionError, RecordError) as error:
+    except (MissionError, RecordError, AddressError) as error:
         say(str(error))
         sys.exit(BAD_INPUT)
     except StoppedError as error:
@@ -62,6 +64,24 @@ def plain_errors() -> Iterator[None]:
         with suppress(OSError):
             sys.stdout.close()  # or the interpreter would try again to write what is left
         sys.exit(BAD_INPUT)
+
+
+class SpeedType(click.ParamType):  # type: ignore[type-arg]
+    """``max``, which becomes None, or a factor."""
+
+    name = "speed"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | None:
+        """Read it; anything else is a bad command line."""
+        if value in (None, "max"):
+            return None
+        try:
+            factor = float(value)
+        except ValueError:
+            factor = 0.0
+        if not 0.0 < factor <= FASTEST:
+            self.fail(f"{value!r} is neither max nor a factor up to {FASTEST:g}", param, ctx)
+        return factor
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -86,27 +106,61 @@ mission_option = click.option(
     "--seed", type=click.IntRange(0, 2**62), default=1, show_default=True, help="Targets, headings, planners."
 )
 @click.option("--duration", type=float, help="Length of the search in seconds.")
-@click.option("--speed", type=click.Choice(["max"]), default="max", help="max: lockstep, as fast as it goes.")
+@click.option(
+    "--speed",
+    type=SpeedType(),
+    metavar="max|FACTOR",
+    help="max: lockstep, as fast as it goes (default without --connect); a factor: live, so many times real time.",
+)
+@click.option(
+    "--connect",
+    "urls",
+    multiple=True,
+    metavar="URL",
+    help="Fly the vehicles there, e.g. udpin://0.0.0.0:14540-14545.",
+)
+@click.option(
+    "--connect-timeout",
+    type=click.FloatRange(0.1),
+    default=20.0,
+    show_default=True,
+    help="Seconds to wait for them.",
+)
 @click.option("--out", type=PathArgument, help="The run's folder (default: runs/DATE-TIME-ALGO).")
 @click.option("--json", "as_json", is_flag=True, help="Print summary.json, and nothing else, on stdout.")
 @click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
 def fly(
     mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
-    speed: str, out: Path | None, as_json: bool, yes: bool,
+    speed: float | None, urls: tuple[str, ...], connect_timeout: float, out: Path | None, as_json: bool, yes: bool,
 ) -> None:  # fmt: skip
-    """Fly a mission with stub vehicles in lockstep, over real MAVLink bytes, and record it."""
-    with plain_errors():
+    """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
+    with plain_errors(), ExitStack() as ending:
+        from . import live_cli
         from .flight import fly as flight
+        from .mission.launch import as_found
 
         mission = _load(mission_file, algorithm, vehicles, duration)
-        _refuse_what_stubs_cannot(mission)
+        if urls:
+            mission = as_found(mission)
+        else:
+            _refuse_what_stubs_cannot(mission)
         name = mission.planner.algorithm
         folder = flight.default_folder(out, name)
         orders = flight.Orders()
+        ending.callback(folder.remove_if_empty)
         with _interruptible(orders):
             _warm_up(mission, name)
-            say(f"flying {len(mission.fleet)} stub vehicles with {name}, seed {seed}, into {folder.path}")
-            outcome = flight.fly(mission, seed, folder, _make_stubs, orders, _progress(mission))
+            what = "vehicles" if urls else "stub vehicles"
+            say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
+            report = _progress(mission)
+            if urls:
+                outcome = live_cli.fly_connected(
+                    mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, report
+                )
+            elif speed is not None:
+                outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, report)
+            else:
+                outcome = flight.fly(mission, seed, folder, _make_stubs, orders, report)
             summary = flight.write_results(outcome, folder)
         if as_json:
             click.echo(json.dumps(summary, indent=2, allow_nan=False))
@@ -143,6 +197,20 @@ def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
         else:
             click.echo(result.as_text())
         sys.exit(0 if result.same else DIFFERS)
+
+
+@main.command()
+@click.argument("run", type=PathArgument)
+@click.argument("order", type=click.Choice(["hold", "resume", "return", "land"]))
+def control(run: Path, order: str) -> None:
+    """Speak to the live flight that records into RUN."""
+    from .flight.control import ControlError, send
+
+    try:
+        click.echo(send(run, [order]))
+    except ControlError as error:
+        say(str(error))
+        sys.exit(BAD_INPUT)
 
 
 @main.command()

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmctl import __version__
 from swarmctl.core import bind, calls
+from swarmctl.core.wire import COLUMNS
 from swarmctl.core.world import World
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
@@ -65,7 +66,7 @@ def warm_up(mission: Mission, algorithm: str) -> bool:
     world.orders[:] = 1
     world.begin_return(0.0)
     world.steer(0.0)
-    calls.read_poses(np.zeros((len(world.fleet), 6)), world.poses, 0.0, 0.0, 0.0)
+    calls.read_poses(np.zeros((len(world.fleet), len(COLUMNS))), world.poses, 0.0, 0.0, 0.0)
     return first_time
 
 
@@ -81,35 +82,37 @@ def fly(
     scenario = Scenario(mission, ideal=False)
     world = scenario.world(seed)
     interval = 1.0 / mission.setpoints.rate_hz
-    settings = SessionSettings(
-        rate_hz=mission.setpoints.rate_hz,
-        setpoint_rate_hz=mission.setpoints.rate_hz,
-        link_loss_s=mission.safety.link_loss_s,
-    )
+    settings = session_settings(mission)
     sessions = [Session(i + 1, settings=settings, now=0.0) for i in range(len(world.fleet))]
     vehicles = make_vehicles(mission, world)
     text = f"# Flown with --seed {seed}.\n" + dump(mission)
     folder.write_text(folder.mission, text)
-    about = {
-        "algorithm": world.algorithm, "seed": str(seed), "version": __version__, "vehicles": "stub",
-        "endurance_s": " ".join(f"{s:g}" for s in endurance_s(mission)),
-    }  # fmt: skip
-    journal = Journal(folder, world, text, about)
+    journal = Journal(folder, world, text, about_flight(mission, world, seed))
     try:
         swarm = Swarm(mission, world, sessions, journal)
         track = Track(len(sessions))
         lockstep = Lockstep(swarm, sessions, vehicles, journal, track, interval, mission.duration_s)
         began = clock.wall_s()
-        lockstep.run(_each_tick(lockstep, swarm, world, orders, report))
+        lockstep.run(obey_and_report(swarm, world, orders, report))
     finally:
         journal.close()
     wall = clock.wall_s() - began
     return Outcome(mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0)
 
 
-def _each_tick(
-    lockstep: Lockstep, swarm: Swarm, world: World, orders: Orders, report: Report
-) -> Callable[[float], None]:
+def session_settings(mission: Mission) -> SessionSettings:
+    """What the mission says of links and rates."""
+    rate = mission.setpoints.rate_hz
+    return SessionSettings(rate_hz=rate, setpoint_rate_hz=rate, link_loss_s=mission.safety.link_loss_s)
+
+
+def about_flight(mission: Mission, world: World, seed: int) -> dict[str, str]:
+    """What a recording says of itself."""
+    endurance = " ".join(f"{s:g}" for s in endurance_s(mission))
+    return {"algorithm": world.algorithm, "seed": str(seed), "version": __version__, "endurance_s": endurance}
+
+
+def obey_and_report(swarm: Swarm, world: World, orders: Orders, report: Report) -> Callable[[float], None]:
     """Obey the operator, and report now and then."""
     due = 0.0
 

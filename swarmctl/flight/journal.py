@@ -20,7 +20,15 @@ By flight time, so that the same flight writes the same bytes.
 class Journal:
     """Writes one flight.  Raises RunFolderError where the disk refuses; ``close`` in any case."""
 
-    def __init__(self, folder: RunFolder, world: World, mission_text: str, about: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        folder: RunFolder,
+        world: World,
+        mission_text: str,
+        about: Mapping[str, str],
+        flush_s: float = FLUSH_S,
+    ) -> None:
+        self._flush_s = flush_s
         self._world = world
         self._log = McapLog(folder.mcap)
         self._tlog = TlogWriter(folder.tlog)
@@ -77,7 +85,7 @@ class Journal:
 
     def breathe(self, now: float) -> None:
         """Now and then give what was written to the operating system."""
-        if now - self._flushed >= FLUSH_S:
+        if now - self._flushed >= self._flush_s:
             self._flushed = now
             self._log.flush()
             self._tlog.flush()

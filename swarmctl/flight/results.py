@@ -35,6 +35,7 @@ class Outcome:
     seed: int
     wall_s: float
     aborted: bool
+    speed: float | None = None  #: times real time; None in lockstep
 
     @property
     def found_s(self) -> Floats:
@@ -94,7 +95,7 @@ class Outcome:
             "seed": self.seed,
             "duration_s": mission.duration_s,
             "searched_s": self.searched_s,
-            "speed": "max",
+            "speed": "max" if self.speed is None else self.speed,
             "wall_s": round(self.wall_s, 3),
             "real_time_factor": round(simulated / self.wall_s, 1) if self.wall_s > 0 else None,
             "targets": targets,

@@ -11,6 +11,7 @@ from enum import Enum
 import numpy as np
 
 from swarmctl.core import calls, stages
+from swarmctl.core.wire import COLUMNS
 from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
@@ -68,6 +69,7 @@ class Swarm:
     def __init__(self, mission: Mission, world: World, sessions: Sequence[Session], journal: Journal) -> None:
         self.part = Part.PREPARING
         self.search_began: float | None = None
+        self.held = False
         self.decisions = 0
         self.messages: list[list[str]] = [[] for _ in sessions]  #: what happened to each vehicle, for people
         self.in_range_total = 0
@@ -75,7 +77,7 @@ class Swarm:
         self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
         origin = mission.origin
         self._origin = (origin.lat, origin.lon, origin.alt_m)
-        self._wire = np.zeros((len(sessions), 6))
+        self._wire = np.zeros((len(sessions), len(COLUMNS)))
         self._period = round(mission.planner.period_s * mission.setpoints.rate_hz)
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
         self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
@@ -101,12 +103,31 @@ class Swarm:
         """Send everyone home who searches; before the search, land everyone where it is."""
         if self.part in (Part.RETURNING, Part.OVER):
             return
+        self.resume(now)
         self._journal.event(now, 0, "return", why)
         if self.part is not Part.SEARCHING:
             self._land_airborne()
         else:
             self._world.orders[:] |= self._world.errands["stage"] == stages.SEARCH
         self.part = Part.RETURNING
+
+    def hold(self, now: float) -> None:
+        """Everybody stands still in the air; the search's clock stands still too."""
+        if self.part is Part.SEARCHING:
+            self.held = True
+            self._journal.event(now, 0, "hold", "ordered by the operator")
+            self._change_stage(stages.SEARCH, stages.HOLD)
+
+    def resume(self, now: float) -> None:
+        """Go on searching after `hold`."""
+        if self.held:
+            self.held = False
+            self._journal.event(now, 0, "resume", "ordered by the operator")
+            self._change_stage(stages.HOLD, stages.SEARCH)
+
+    def _change_stage(self, old: int, new: int) -> None:
+        stage = self._world.errands["stage"]
+        stage[stage == old] = new
 
     def land_all(self, now: float) -> None:
         """Land everyone where it is, at once."""
@@ -117,14 +138,15 @@ class Swarm:
     def tick(self, k: int, now: float) -> None:
         """One setpoint tick at flight time ``now``; the sessions have taken in what arrived by then."""
         self._take_events(now)
-        self._read_telemetry()
+        self._read_telemetry(now)
         self._go_on(k, now)
         self._follow_stages()
         if self.part is Part.SEARCHING:
             for i in range(len(self._sessions)):
                 self._heed_battery(i, now)
+        self._began_at += self.held
         ahead = k - self._began_at
-        if self.part is Part.SEARCHING and ahead % self._period == 0:
+        if self.part is Part.SEARCHING and not self.held and ahead % self._period == 0:
             if ahead // self._period < self._planner_ticks:
                 self._plan(ahead // self._period, now)
             else:
@@ -190,11 +212,12 @@ class Swarm:
             self._journal.event(now, self._sessions[i].system, "battery", text)
             self.messages[i].append(f"{now:.1f} s: {text}")
 
-    def _read_telemetry(self) -> None:
+    def _read_telemetry(self, now: float) -> None:
         for i, session in enumerate(self._sessions):
             t = session.telemetry
             self._flown[i] |= t.height_m > LOW_M
-            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up)
+            age = now - t.received_at if t.positioned else 0.0
+            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age)
         calls.read_poses(self._wire, self._world.poses, *self._origin)
 
     def _go_on(self, k: int, now: float) -> None:

@@ -16,9 +16,17 @@ from swarmctl.core.calls import uniform
 from swarmctl.core.randoms import LAUNCH
 
 from .geometry import Regions
-from .model import Mission
+from .model import Mission, VehicleGroup
 
 FAR_M = 1e6
+
+
+def as_found(mission: Mission) -> Mission:
+    """The mission with real vehicles: launched where they stand, unless it says where."""
+    vehicles = mission.vehicles
+    if not isinstance(vehicles, VehicleGroup) or "launch" in vehicles.model_fields_set:
+        return mission
+    return mission.model_copy(update={"vehicles": vehicles.model_copy(update={"launch": "as_found"})})
 
 
 def ideal_start(regions: Regions) -> Floats:

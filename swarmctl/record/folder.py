@@ -87,6 +87,11 @@ class RunFolder:
             raise RunFolderError(f"{path}: not a run folder: it has no {' and no '.join(missing)}")
         return folder
 
+    def remove_if_empty(self) -> None:
+        """Remove the folder if nothing was written into it."""
+        with suppress(OSError):
+            self.path.rmdir()
+
     def write_text(self, path: Path, text: str) -> None:
         """Write ``path`` (a file of this folder) whole, or leave what was there and raise RunFolderError."""
         write_whole(path, text.encode())
