@@ -5,10 +5,13 @@ COMMAND_ACK would answer a new command.  Nor is one that was overtaken on the wa
 state: an old HEARTBEAT would show a mode that is no more.
 """
 
+from typing import Any
+
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
 
-AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
+from .commands import AUTOPILOT_COMPONENT
+
 GROUND_SYSTEM = 255  #: the only system id that ArduPilot takes for its ground station
 GROUND_COMPONENT: int = mav.MAV_COMP_ID_MISSIONPLANNER
 
@@ -85,6 +88,15 @@ class Link:
         """Queue a frame."""
         self._outgoing.append(frame)
         self._traffic.append(frame)
+
+    def send_message(self, message: Any) -> None:
+        """Queue a pymavlink message."""
+        self.send(self.encoder.encode(message))
+
+    def send_heartbeat(self) -> None:
+        """Queue a ground station's HEARTBEAT."""
+        beat = (mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE)
+        self.send(self.encoder.heartbeat(*beat))
 
     def outgoing(self) -> list[bytes]:
         """The queued frames, which are then forgotten."""
