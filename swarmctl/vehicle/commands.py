@@ -41,6 +41,17 @@ class Command(NamedTuple):
         )
 
 
+class Several(NamedTuple):
+    """Asks for several things at once."""
+
+    name: str
+    asks: tuple[Ask, ...]
+
+    def messages(self, system: int, confirmation: int) -> tuple[Any, ...]:
+        """All their messages."""
+        return tuple(message for ask in self.asks for message in ask.messages(system, confirmation))
+
+
 def command(name: str, number: int, *parameters: float) -> Command:
     """A command; the parameters that are not given are 0."""
     p = (*parameters, *(0.0,) * (7 - len(parameters)))

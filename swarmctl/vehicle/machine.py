@@ -12,13 +12,16 @@ from .autopilots.registry import ADAPTERS, adapter_for, autopilot_name
 from .commands import Ask
 from .events import Event, EventKind, TextAssembler
 from .link import Link
-from .phases import STREAMING, TABLE, Action, Phase, Signal
+from .phases import SET_UP, STREAMING, TABLE, Action, Phase, Signal
 from .preflight import Checks, Preflight
 from .settings import SessionSettings
 from .statistics import Tally
 from .steps import TIME_SLACK_S, Procedure, Step
 from .telemetry import Telemetry
 from .watch import Watch
+
+# On the ground, a few heartbeats may be dropped by a bad link while everything else says that it lives.
+BEATS_LOST = 3
 
 
 class Machine:
@@ -47,6 +50,8 @@ class Machine:
         self._heartbeat_due = now
         self._hold_due = math.inf
         self._heard_at = now
+        self._beat_at = now
+        self._set_ups = 0
         self._actions = {action: getattr(self, f"_{action.value}") for action in Action}
         self._schedule()
 
@@ -114,10 +119,14 @@ class Machine:
     def _identify(self) -> None:
         self.telemetry.forget()
         self._watch.begin()
+        self._set_ups += 1
         self.adapter = adapter_for(self._autopilot)
         if self.adapter is None:
             known = ", ".join(autopilot_name(number) for number in ADAPTERS)
             self.reason = f"its autopilot is {autopilot_name(self._autopilot)}; can fly: {known}"
+            self._signal(Signal.STEP_FAILED)
+        elif self._set_ups > self._settings.set_up_attempts:
+            self.reason = f"its set-up was broken off {self._set_ups - 1} times"
             self._signal(Signal.STEP_FAILED)
         else:
             self._begin(procedures.identifying(self._settings))
@@ -150,6 +159,7 @@ class Machine:
 
     def _rest(self) -> None:
         """Nothing to do until the next order."""
+        self._set_ups = 0
 
     def _fail(self) -> None:
         self._procedure = None
@@ -199,8 +209,12 @@ class Machine:
 
     def _link_deadline(self) -> float:
         """When the link counts as lost, in the phases that can lose it."""
-        can_lose = (self.phase, Signal.LINK_LOST) in TABLE
-        return self._heard_at + self._settings.link_loss_s if can_lose else math.inf
+        if (self.phase, Signal.LINK_LOST) not in TABLE:
+            return math.inf
+        silence_s = self._settings.link_loss_s
+        if self.phase not in SET_UP:
+            return self._beat_at + silence_s
+        return min(self._heard_at + silence_s, self._beat_at + BEATS_LOST * silence_s)
 
     def _schedule(self) -> None:
         """Work out when ``poll`` is next needed."""

@@ -7,7 +7,7 @@ Nothing that telemetry can show is taken on the word of a COMMAND_ACK; message r
 from swarmctl.mavlink.dialect import mav
 
 from .autopilots.adapter import Adapter
-from .commands import disarm, message_interval, request_message
+from .commands import Several, disarm, message_interval, request_message
 from .settings import SessionSettings
 from .steps import Condition, OnFailure, Step
 from .telemetry import Telemetry
@@ -81,8 +81,18 @@ def positioning(adapter: Adapter, settings: SessionSettings) -> Steps:
         *((origin,) if adapter.needs_origin else ()),
         _requested("home", mav.MAVLINK_MSG_ID_HOME_POSITION, patience, lambda t: t.home is not None),
         *adapter.prepare(settings),
-        Step("ready to arm", patience, confirmed=lambda t: t.healthy and not t.armed),
+        _gate(adapter, settings),
     )
+
+
+def _gate(adapter: Adapter, settings: SessionSettings) -> Step:
+    """Ready to arm; what the adapter tells that by is asked for again now and then."""
+    asks = tuple(message_interval(i, hz) for i, hz in adapter.extra_rates.items())
+    pause = settings.reminder_s
+    return Step(
+        "ready to arm", settings.ready_patience_s, command=Several("message rates", asks) if asks else None,
+        confirmed=lambda t: t.healthy and not t.armed, wait_s=pause, answer_s=pause, insists=True,
+    )  # fmt: skip
 
 
 def _stands(telemetry: Telemetry) -> bool:

@@ -57,6 +57,7 @@ class Session(Machine):
         """Take in bytes from the link: any part of a frame, or many, of any vehicle."""
         self._now = now
         for frame in self._link.take(data):
+            self._heard_at = now
             if frame.message_id == GLOBAL_POSITION_INT:
                 booted_ms = self.telemetry.boot_ms
                 read_position(self.telemetry, frame.fields, now)
@@ -239,7 +240,7 @@ class Session(Machine):
 
     def _read_heartbeat(self, fields: Any, was_armed: bool) -> None:
         """The vehicle lives; is it still ours?"""
-        self._heard_at = self._now
+        self._beat_at = self._now
         self._autopilot = fields.autopilot
         if self.phase is Phase.LOST:
             set_up = self._phase_when_lost in SET_UP

@@ -21,7 +21,7 @@ class SessionSettings:
     setpoint_rate_hz: float = 10.0  #: hold setpoints while offboard mode is being entered
 
     heartbeat_period_s: float = 1.0  #: our own HEARTBEAT
-    link_loss_s: float = 3.0  #: without the vehicle's HEARTBEAT its link counts as lost
+    link_loss_s: float = 3.0  #: without HEARTBEAT; on the ground, of silence: the link counts as lost
     ack_timeout_s: float = 0.5  #: a command without COMMAND_ACK is sent again
     attempts: int = 12  #: unanswered sendings of one command until the session gives up
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again
@@ -29,6 +29,8 @@ class SessionSettings:
     position_loss_s: float = 2.0  #: heartbeats without a valid position for so long: the position is lost
     battery_low_percent: float = 25.0  #: at or below it, the battery is reported as low
 
+    set_up_attempts: int = 6  #: set-ups broken off by a lost link or a restart until the session gives up
+    reminder_s: float = 10.0  #: while a vehicle gets ready, what tells so is asked for again this often
     ready_patience_s: float = 90.0  #: for each of position, home, origin and health before take-off
     command_patience_s: float = 20.0  #: for a command to be accepted and confirmed by telemetry
     parameter_patience_s: float = 6.0  #: for each parameter; unknown ones may go without any answer

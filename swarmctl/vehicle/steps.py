@@ -199,7 +199,7 @@ class Procedure:
     def _impatience(self, step: Step) -> str:
         """What to say of a step that took too long."""
         seconds = step.patience_s * self._settings.time_scale
-        if step.command is None:
+        if not isinstance(step.command, Command):
             return f"{step.name}: not reached in {seconds:g} s{self._quote()}"
         last = f"; last answer {self._result}" if self._result else "; never answered"
         return f"{step.name}: {step.command.name} had no effect in {seconds:g} s{last}{self._quote()}"
