@@ -59,7 +59,7 @@ class Checks:
         """Upload, read back, compare; each may take the time of all its messages."""
         transfer = self.transfer = FenceTransfer(fence, self._link.system)
         wait = self._settings.transfer_timeout_s
-        patience = (len(transfer.vertices) + 4) * wait
+        patience = (len(transfer.vertices) + 20) * wait
         upload = Step(
             "fence upload", patience, command=FenceUpload(transfer), confirmed=lambda t: transfer.stored,
             failed=lambda: transfer.refusal, insists=True, answer_s=wait,
