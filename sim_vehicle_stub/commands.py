@@ -31,6 +31,7 @@ class Command(NamedTuple):
     z: float
     sender_system: int
     sender_component: int
+    frame: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 def from_long(frame: Frame) -> Command:
@@ -48,7 +49,7 @@ def from_int(frame: Frame) -> Command:
     scale = 1e-7 if f.frame in DEGREE_FRAMES else 1.0
     x, y = (math.nan if value == NO_PLACE else value * scale for value in (f.x, f.y))
     return Command(
-        f.command, f.param1, f.param2, f.param3, f.param4, x, y, f.z, frame.system, frame.component
+        f.command, f.param1, f.param2, f.param3, f.param4, x, y, f.z, frame.system, frame.component, f.frame
     )  # fmt: skip
 
 
@@ -94,8 +95,15 @@ def get_message_interval(vehicle: "StubVehicle", command: Command) -> int:
     return int(mav.MAV_RESULT_ACCEPTED)
 
 
+def tell_version(vehicle: "StubVehicle", command: Command) -> int:
+    """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, the older way to ask for AUTOPILOT_VERSION."""
+    vehicle.send(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    return int(mav.MAV_RESULT_ACCEPTED)
+
+
 LINK_COMMANDS: dict[int, Any] = {
     mav.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval,
     mav.MAV_CMD_GET_MESSAGE_INTERVAL: get_message_interval,
     mav.MAV_CMD_REQUEST_MESSAGE: request_message,
+    mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: tell_version,
 }

@@ -355,7 +355,8 @@ class StubVehicle:
             self._set_home()
         if not self.located and self.now >= self._located_at:
             self.fixed = self.located = True
-            self.send(mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+            if self.personality.announces_origin:
+                self.send(mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
     def _feel_ground(self, elapsed: float) -> None:
         """Tell standing from flying."""

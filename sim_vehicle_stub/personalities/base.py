@@ -39,6 +39,10 @@ class Personality(Protocol):
     """Whether a plan is asked for with MISSION_REQUEST_INT."""
     answers_any_component: bool
     tells_parameter_errors: bool
+    shows_prearm: bool
+    """Whether SYS_STATUS has the pre-arm check among the sensors present and enabled."""
+    announces_origin: bool
+    """Whether GPS_GLOBAL_ORIGIN is sent, once, when the position is found."""
 
     @staticmethod
     def parameters(limits: Limits) -> dict[str, float]:

@@ -5,7 +5,7 @@ firmware remembers beside the mode it is in (which a failsafe may have chosen) t
 the ground.  Commands are in px4_commands.py, setpoints and what they mean in px4_setpoints.py.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from swarmctl.mavlink.codec import Frame
@@ -48,15 +48,17 @@ class Px4:
     base_mode = AUTO_BASE_MODE
     LIMITS = Limits()
     ENCODING = BYTEWISE
-    DATA_STREAMS: ClassVar[dict[int, tuple[int, ...]]] = {}
+    DATA_STREAMS: ClassVar[Mapping[int, tuple[int, ...]]] = {}
     LOCATED_AFTER_S, HOME_AFTER_S, QUIET_FOR_S = 2.0, 3.0, 0.0
     TEXT_END = "\t"
     texts_need_gcs = True
     requests_integers = True
     answers_any_component = False
     tells_parameter_errors = True
+    shows_prearm = False
+    announces_origin = True
 
-    INTERVALS_US: ClassVar = {
+    INTERVALS_US: ClassVar[Mapping[int, int]] = {
         mav.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
         mav.MAVLINK_MSG_ID_SYS_STATUS: 200_000,
         mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
