@@ -328,6 +328,11 @@ class StubVehicle:
         if "gps-loss" in self.faults:
             self.lose_fix()
 
+    def start(self, now: float) -> None:
+        """Boot now, as firmware that has waited for its first client does."""
+        self.now = now
+        self._boot(now)
+
     def build_fence(self, items: list[Item]) -> None:
         """Hold the fence that these items describe."""
         self.fence = fence_of(items, self.fleet_origin)
