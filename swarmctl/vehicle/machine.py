@@ -75,6 +75,8 @@ class Machine:
         """Keep the reason of what is about to happen, told from the phase in which it does."""
         if signal is Signal.DISARMED:
             self.reason = f"it disarmed while {self.phase.value}"
+        elif signal is Signal.CAME_DOWN:
+            self.reason = f"it came down while {self.phase.value}"
         elif signal is Signal.RESTARTED:
             self.reason = f"its autopilot restarted while {self.phase.value}"
         elif signal is Signal.MODE_TAKEN and self.adapter is not None:
@@ -154,8 +156,8 @@ class Machine:
         self._begin(procedures.stopping(self._known_adapter(), self._settings))
 
     def _land(self) -> None:
-        restarted = self._watch.restarted
-        self._begin(procedures.landing(self._known_adapter(), self.telemetry, self._settings, restarted))
+        ask_rates = self._watch.streams_gone
+        self._begin(procedures.landing(self._known_adapter(), self.telemetry, self._settings, ask_rates))
 
     def _rest(self) -> None:
         """Nothing to do until the next order."""
@@ -180,7 +182,10 @@ class Machine:
 
     def _resume(self) -> None:
         self._report(EventKind.REGAINED, f"vehicle {self.system}: heartbeat again")
-        if self._procedure is not None:
+        if self.phase is Phase.LANDING:
+            self._watch.streams_gone = True
+            self._land()
+        elif self._procedure is not None:
             self._procedure.begin_step(self._now)
 
     # Sending

@@ -45,6 +45,7 @@ class Signal(Enum):
     RETAKE = "order: retake"
     MODE_TAKEN = "mode changed by another"
     DISARMED = "disarmed"
+    CAME_DOWN = "on the ground unasked"
     POSITION_LOST = "position lost"
     RESTARTED = "autopilot restarted"
     LINK_LOST = "link lost"
@@ -129,6 +130,7 @@ def _table() -> Table:
         ((Phase.READY,), Signal.POSITION_LOST, Action.IDENTIFY, Phase.IDENTIFYING),
         (SET_UP, Signal.RESTARTED, Action.IDENTIFY, Phase.IDENTIFYING),
         (FLYING, Signal.RESTARTED, Action.FAIL, Phase.FAILED),
+        ((Phase.HOLDING, Phase.ENGAGED, *STREAMING), Signal.CAME_DOWN, Action.FAIL, Phase.FAILED),
         (FLYING, Signal.DISARMED, Action.FAIL, Phase.FAILED),
         (FLYING, Signal.MODE_TAKEN, Action.RELEASE, Phase.RELEASED),
         ((*SET_UP, *FLYING, Phase.RELEASED), Signal.LINK_LOST, Action.SUSPEND, Phase.LOST),

@@ -162,12 +162,12 @@ def stopping(adapter: Adapter, settings: SessionSettings) -> Steps:
     )
 
 
-def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings, restarted: bool) -> Steps:
+def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings, ask_rates: bool) -> Steps:
     """Land here, disarm if the firmware does not, and leave a mode from which arming is harmless.
 
     On disarming, PX4 falls back to an earlier mode; were that offboard, a vehicle that is armed while
     setpoints flow would fly.  The land mode is asked for even of a vehicle that stands disarmed: an ARM may
-    still be on its way.  ``restarted``: the vehicle has forgotten which messages we want.
+    still be on its way.  ``ask_rates``: the vehicle may have forgotten which messages we want.
     """
     modes = adapter.modes
     patience = settings.command_patience_s
@@ -180,7 +180,7 @@ def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings, r
             confirmed=lambda t: t.mode == modes.land,
             insists=True,
         ),
-        *(_rates(adapter, settings, OnFailure.IGNORE) if restarted else ()),
+        *(_rates(adapter, settings, OnFailure.IGNORE) if ask_rates else ()),
         Step(
             "touch-down",
             settings.landing_patience_s + descent_s,

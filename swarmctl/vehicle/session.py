@@ -14,7 +14,7 @@ What happens in the air, and what the session does about it:
   restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
 - It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
-- It disarms, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
+- It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
 - Its battery is low: an event; what to do about it is for the caller to say.
 """
 
@@ -37,6 +37,7 @@ from .watch import RESTART_MS
 
 GLOBAL_POSITION_INT: int = mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
 HEARTBEAT: int = mav.MAVLINK_MSG_ID_HEARTBEAT
+LANDED_STATE: int = mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 COMMAND_ACK: int = mav.MAVLINK_MSG_ID_COMMAND_ACK
 STATUSTEXT: int = mav.MAVLINK_MSG_ID_STATUSTEXT
 
@@ -221,6 +222,9 @@ class Session(Machine):
             self.adapter.observe(frame.message_id, frame.fields, self.telemetry)
         if frame.message_id == HEARTBEAT:
             self._read_heartbeat(frame.fields, was_armed)
+        elif frame.message_id == LANDED_STATE:
+            if self.telemetry.landed_state == procedures.ON_GROUND:
+                self._signal(Signal.CAME_DOWN)
         elif frame.message_id == COMMAND_ACK:
             self._read_ack(frame.fields)
         elif frame.message_id == STATUSTEXT:
@@ -263,6 +267,7 @@ class Session(Machine):
 
     def _position_lost(self) -> None:
         """Heartbeats, but no position."""
+        self._watch.streams_gone = True
         if (self.phase, Signal.POSITION_LOST) in TABLE:
             text = f"vehicle {self.system}: no valid position while {self.phase.value}"
             self._report(EventKind.POSITION_LOST, text)
@@ -270,7 +275,7 @@ class Session(Machine):
 
     def _restarted(self) -> None:
         """Its clock runs from zero again."""
-        self._watch.restarted = True
+        self._watch.streams_gone = True
         text = f"vehicle {self.system}: its autopilot restarted while {self.phase.value}"
         self._report(EventKind.RESTARTED, text)
         self._signal(Signal.RESTARTED)

@@ -198,7 +198,7 @@ class Procedure:
 
     def _impatience(self, step: Step) -> str:
         """What to say of a step that took too long."""
-        seconds = step.patience_s * self._settings.time_scale
+        seconds = round(step.patience_s * self._settings.time_scale, 1)
         if not isinstance(step.command, Command):
             return f"{step.name}: not reached in {seconds:g} s{self._quote()}"
         last = f"; last answer {self._result}" if self._result else "; never answered"

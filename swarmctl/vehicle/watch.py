@@ -22,7 +22,7 @@ class Watch:
 
     def begin(self) -> None:
         """Start anew: the vehicle is being set up."""
-        self.restarted = False  #: it has booted again since
+        self.streams_gone = False  #: it may have forgotten what it was asked to send
         self._low_battery_told = False
         self.forgive()
 
@@ -32,12 +32,13 @@ class Watch:
         self._beat_at = float("-inf")
 
     def position_lost(self, telemetry: Telemetry, now: float) -> bool:
-        """Count a heartbeat; whether the position is lost by now."""
+        """Count a heartbeat; whether the position is lost by now.  Before the first there is none to lose."""
         came_since = telemetry.received_at >= self._beat_at
         self._beats = 0 if came_since else self._beats + 1
         self._beat_at = now
         missing_s = now - telemetry.received_at
-        return self._beats >= BEATS_WITHOUT_POSITION and missing_s >= self._settings.position_loss_s
+        long_ago = telemetry.positioned and missing_s >= self._settings.position_loss_s
+        return self._beats >= BEATS_WITHOUT_POSITION and long_ago
 
     def battery_low(self, telemetry: Telemetry) -> bool:
         """Whether the battery is low; said once."""

@@ -278,6 +278,14 @@ def test_a_lost_vehicle_that_was_not_ours_in_the_air_is_not_landed(rig: Any, pha
     assert rig.session.phase is Phase.LOST
 
 
+def test_a_landing_asks_for_the_streams_only_if_they_may_be_gone(rig: Any) -> None:
+    search(rig)
+    asked = len(rig.vehicle.asked_for(INTERVAL))
+    rig.session.land()
+    rig.until_phase(Phase.LANDED)
+    assert len(rig.vehicle.asked_for(INTERVAL)) == asked
+
+
 def test_land_mode_is_asked_for_through_refusals(rig: Any) -> None:
     search(rig)
     rig.vehicle.results[SET_MODE] = [[mav.MAV_RESULT_DENIED]] * 10

@@ -63,6 +63,12 @@ def blind(rig: Any) -> None:
     rig.run(5.0)
 
 
+def come_down(rig: Any) -> None:
+    rig.vehicle.landed_state = mav.MAV_LANDED_STATE_ON_GROUND
+    rig.vehicle.deaf.add(mav.MAV_CMD_DO_SET_MODE)
+    rig.run(1.0)
+
+
 def restart(rig: Any) -> None:
     """The vehicle's clock runs backwards."""
     rig.vehicle.out.clear()
@@ -93,6 +99,7 @@ CAUSES: dict[Signal, Callable[[Any], None]] = {
     Signal.LAND: lambda rig: rig.session.land(),
     Signal.RELEASE: lambda rig: rig.session.release(),
     Signal.RETAKE: lambda rig: rig.session.retake(),
+    Signal.CAME_DOWN: come_down,
     Signal.POSITION_LOST: blind,
     Signal.RESTARTED: restart,
     Signal.MODE_TAKEN: steal,
