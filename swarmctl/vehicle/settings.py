@@ -27,7 +27,7 @@ class SessionSettings:
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again
     retry_pause_s: float = 1.0  #: before a temporarily rejected command is sent again
     position_loss_s: float = 2.0  #: heartbeats without a valid position for so long: the position is lost
-    battery_low_percent: float = 25.0  #: at or below it, the battery is reported as low
+    battery_low_percent: float | None = None  #: at or below it, the battery is reported as low; None: never
 
     set_up_attempts: int = 6  #: set-ups broken off by a lost link or a restart until the session gives up
     reminder_s: float = 10.0  #: while a vehicle gets ready, what tells so is asked for again this often
@@ -49,7 +49,7 @@ class SessionSettings:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
+            if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"session setting {field.name} must be positive and finite, not {value}")
 
     def on_clock(self) -> "SessionSettings":

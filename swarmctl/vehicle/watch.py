@@ -42,8 +42,8 @@ class Watch:
 
     def battery_low(self, telemetry: Telemetry) -> bool:
         """Whether the battery is low; said once."""
-        percent = telemetry.battery_percent
-        if self._low_battery_told or percent is None or percent > self._settings.battery_low_percent:
+        percent, limit = telemetry.battery_percent, self._settings.battery_low_percent
+        if self._low_battery_told or percent is None or limit is None or percent > limit:
             return False
         self._low_battery_told = True
         return True

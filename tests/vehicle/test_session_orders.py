@@ -105,6 +105,7 @@ def test_a_released_vehicle_is_retaken_only_by_order(rig: Any) -> None:
     rig.vehicle.mode = MODES.comeback
     rig.run(2.0)
     rig.session.retake()
+    rig.vehicle.heartbeat()
     rig.until_phase(Phase.ENGAGED)
     rig.run(1.0)
     assert rig.vehicle.mode == MODES.engaged and rig.vehicle.velocity_en == (3.0, 0.0)
@@ -170,7 +171,8 @@ def test_the_position_time_out_is_in_the_vehicles_time(make_rig: Any) -> None:
     assert took == pytest.approx([2.0, 5.0], abs=1.01)
 
 
-def test_a_low_battery_is_told_once(rig: Any) -> None:
+def test_a_low_battery_is_told_once(make_rig: Any) -> None:
+    rig = make_rig(battery_low_percent=25.0)
     search(rig)
     rig.vehicle.battery = 25
     rig.run(5.0)
@@ -180,9 +182,13 @@ def test_a_low_battery_is_told_once(rig: Any) -> None:
     assert rig.session.phase is Phase.ENGAGED
 
 
-def test_an_unknown_battery_is_not_low(rig: Any) -> None:
+@pytest.mark.parametrize(("battery", "limit"), [(-1, 25.0), (26, 25.0), (3, None)])
+def test_an_unknown_battery_is_not_low_nor_one_that_nobody_asks_about(
+    make_rig: Any, battery: int, limit: float | None
+) -> None:
+    rig = make_rig(battery_low_percent=limit)
     search(rig)
-    rig.vehicle.battery = -1
+    rig.vehicle.battery = battery
     rig.run(5.0)
     assert rig.texts(EventKind.BATTERY_LOW) == []
 
