@@ -2,7 +2,8 @@
 
 What a vehicle's firmware makes of setpoints and modes arrives here as a command: a velocity or a place
 horizontally, a climb rate, a height or a landing vertically.  The motion itself is ``swarmctl.core.motion``.
-Ground is flat, at height zero; every vehicle starts standing on it.
+Ground is flat, at height zero; every vehicle starts standing on it.  Firmware flies over the ground, so a
+steady wind shows only where it exceeds what the vehicle can fly against, and where nothing holds the place.
 """
 
 import math
@@ -20,15 +21,23 @@ Records = NDArray[Any]
 
 BODY = POSE
 
-# `powered`: motors run. `aim`: VELOCITY or PLACE. `lift`: CLIMB_RATE, HEIGHT or DESCENT. `east`, `north`:
-# m/s or m. `up`: m/s or m. `speed`, `climb`, `descent`: limits of this manoeuvre.
+# `powered`: motors run. `aim`: VELOCITY, PLACE or DRIFT. `lift`: CLIMB_RATE, HEIGHT or DESCENT. `east`,
+# `north`: m/s or m. `up`: m/s or m. `speed`, `climb`, `descent`: limits of this manoeuvre.
 COMMAND = np.dtype(
     [(name, "<i8") for name in ("powered", "aim", "lift")]
     + [(name, "<f8") for name in ("east", "north", "up", "speed", "climb", "descent", "landing")]
 )
-LIMITS = np.dtype([(name, "<f8") for name in ("speed", "acceleration", "climb_acceleration", "lag")])
 
-VELOCITY, PLACE = 0, 1
+# `acceleration` where the vehicle gets faster, `braking` where slower, `approach` towards a place (m/s²);
+# `speed` over the ground, `airspeed` through the air (m/s); `lag` (s) with which velocity is followed.
+LIMITS = np.dtype(
+    [
+        (name, "<f8")
+        for name in ("speed", "airspeed", "acceleration", "braking", "approach", "climb_acceleration", "lag")
+    ]
+)
+
+VELOCITY, PLACE, DRIFT = 0, 1, 2
 CLIMB_RATE, HEIGHT, DESCENT = 0, 1, 2
 
 # Columns of what `read_sensors` fills: GLOBAL_POSITION_INT from `lat` to `vz`.
@@ -47,17 +56,42 @@ def landing_rate(up: float, descent: float, landing: float) -> float:
 
 
 @kernel
-def move_one(body: Any, command: Any, limits: Any, dt: float) -> None:
-    """One vehicle, ``dt`` seconds further."""
+def ground_velocity(
+    body: Any, command: Any, limits: Any, wind_east: float, wind_north: float
+) -> tuple[float, float]:
+    """The horizontal velocity (m/s over the ground) that the command asks for and the wind allows."""
     c_east, c_north = command["east"], command["north"]
+    if command["aim"] == DRIFT:
+        return wind_east, wind_north
     if command["aim"] == PLACE:
         c_east -= body["east"]
         c_north -= body["north"]
         gap = math.sqrt(c_east * c_east + c_north * c_north)
-        speed = climb_rate_towards(0.0, gap, command["speed"], command["speed"], limits["acceleration"])
+        speed = climb_rate_towards(0.0, gap, command["speed"], command["speed"], limits["approach"])
         if gap > 0.0:
             c_east *= speed / gap
             c_north *= speed / gap
+    if wind_east == 0.0 and wind_north == 0.0:
+        return c_east, c_north
+    return against_wind(c_east, c_north, limits["airspeed"], wind_east, wind_north)
+
+
+@kernel
+def against_wind(
+    c_east: float, c_north: float, airspeed: float, wind_east: float, wind_north: float
+) -> tuple[float, float]:
+    """The velocity nearest to a commanded one for which the vehicle need not be faster through the air."""
+    a_east, a_north = c_east - wind_east, c_north - wind_north
+    size = math.sqrt(a_east * a_east + a_north * a_north)
+    if size <= airspeed:
+        return c_east, c_north
+    return wind_east + a_east * airspeed / size, wind_north + a_north * airspeed / size
+
+
+@kernel
+def move_one(body: Any, command: Any, limits: Any, wind_east: float, wind_north: float, dt: float) -> None:
+    """One vehicle, ``dt`` seconds further."""
+    c_east, c_north = ground_velocity(body, command, limits, wind_east, wind_north)
     c_up = command["up"]
     if command["lift"] == HEIGHT:
         c_up = climb_rate_towards(
@@ -68,9 +102,12 @@ def move_one(body: Any, command: Any, limits: Any, dt: float) -> None:
     if body["up"] <= 0.0 and c_up <= 0.0:
         stand(body)
         return
+    v_east, v_north = body["v_east"], body["v_north"]
+    slower = c_east * c_east + c_north * c_north < v_east * v_east + v_north * v_north
+    change = limits["braking"] if slower else limits["acceleration"]
     body["east"], body["north"], body["v_east"], body["v_north"] = horizontal(
-        body["east"], body["north"], body["v_east"], body["v_north"],
-        c_east, c_north, limits["speed"], limits["acceleration"], limits["lag"], dt,
+        body["east"], body["north"], v_east, v_north,
+        c_east, c_north, limits["speed"], change, limits["lag"], dt,
     )  # fmt: skip
     body["up"], body["v_up"] = vertical(
         body["up"], body["v_up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"], dt
@@ -100,27 +137,34 @@ def fall_one(body: Any, dt: float) -> None:
 
 
 @kernel
-def move(bodies: Records, commands: Records, limits: Records, steps: int, dt: float) -> None:
+def move(
+    bodies: Records, commands: Records, limits: Records, wind_east: float, wind_north: float,
+    steps: int, dt: float,
+) -> None:  # fmt: skip
     """All vehicles, ``steps`` times ``dt`` seconds further; the arrays have one row a vehicle."""
     for k in range(bodies.shape[0]):
         for _ in range(steps):
             if commands[k]["powered"] == 1:
-                move_one(bodies[k], commands[k], limits[k], dt)
+                move_one(bodies[k], commands[k], limits[k], wind_east, wind_north, dt)
             else:
                 fall_one(bodies[k], dt)
 
 
 @kernel
 def read_sensors(
-    bodies: Records, wire: NDArray[np.int64], origin_lat: float, origin_lon: float, origin_alt: float
-) -> None:
-    """Fill ``wire`` (V, 7): places in 1e-7 degrees, heights in mm, speeds north, east, down in cm/s."""
+    bodies: Records, wire: NDArray[np.int64], altitude_errors: NDArray[np.float64],
+    origin_lat: float, origin_lon: float, origin_alt: float,
+) -> None:  # fmt: skip
+    """Fill ``wire`` (V, 7): places in 1e-7 degrees, heights in mm, speeds north, east, down in cm/s.
+
+    ``altitude_errors`` (V,): metres by which each vehicle's altitude above sea level reads too high.
+    """
     for k in range(bodies.shape[0]):
         body = bodies[k]
         lat, lon = to_geodetic(body["east"], body["north"], origin_lat, origin_lon, origin_alt)
         wire[k, 0] = round(lat * 1e7)
         wire[k, 1] = round(lon * 1e7)
-        wire[k, 2] = round((body["up"] + origin_alt) * 1000.0)
+        wire[k, 2] = round((body["up"] + origin_alt + altitude_errors[k]) * 1000.0)
         wire[k, 3] = round(body["up"] * 1000.0)
         wire[k, 4] = round(body["v_north"] * 100.0)
         wire[k, 5] = round(body["v_east"] * 100.0)

@@ -1,11 +1,17 @@
-"""The command `sim-vehicle-stub`: a fleet of stub vehicles on UDP ports of this machine."""
+"""The command `sim-vehicle-stub`: a fleet of stub vehicles on UDP, TCP or pseudo-terminals of this machine."""
 
 import asyncio
 import contextlib
 
 import click
 
+from .faults import FAULTS, parse_order
+
 DEFAULT_PORT, OWN_PORT_OFFSET = 14540, 40
+AUTOPILOTS = ("px4", "ardupilot", "ardupilot-4.6")
+TCP_SPACING = 10
+MOST_VEHICLES = 250
+STRONGEST_MPS = 100.0
 DEFAULT_HOME = "47.3977,8.5456,488"
 SPACING_M = 20.0
 FASTEST = 100.0
@@ -31,16 +37,42 @@ def parse_speed(context: click.Context, option: click.Parameter, speed: float) -
     return speed
 
 
+def parse_autopilots(context: click.Context, option: click.Parameter, text: str) -> list[str]:
+    """Read names of firmwares."""
+    names = text.split(",")
+    for name in names:
+        if name not in AUTOPILOTS:
+            raise click.BadParameter(f"{name!r} is none of {', '.join(AUTOPILOTS)}")
+    return names
+
+
+def parse_wind(context: click.Context, option: click.Parameter, text: str) -> tuple[float, float]:
+    """Read EAST,NORTH; m/s."""
+    try:
+        east, north = (float(part) for part in text.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not EAST,NORTH, as in 3,-1.5") from None
+    if not abs(east) + abs(north) <= STRONGEST_MPS:
+        raise click.BadParameter(f"{text!r} is more than {STRONGEST_MPS:g} m/s")
+    return east, north
+
+
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--vehicles",
-    type=click.IntRange(1, OWN_PORT_OFFSET),
+    type=click.IntRange(1, MOST_VEHICLES),
     default=1,
     show_default=True,
-    help="How many; system ids count from 1.",
+    help=f"How many; system ids count from 1. On UDP ports of their own at most {OWN_PORT_OFFSET}.",
 )
 @click.option(
-    "--autopilot", type=click.Choice(["px4"]), default="px4", show_default=True, help="The firmware to play."
+    "--autopilot",
+    "autopilots",
+    callback=parse_autopilots,
+    default="px4",
+    show_default=True,
+    metavar="NAME[,NAME...]",
+    help=f"The firmware to play, one for all or one each: {', '.join(AUTOPILOTS)}.",
 )
 @click.option(
     "--speed",
@@ -52,10 +84,20 @@ def parse_speed(context: click.Context, option: click.Parameter, speed: float) -
 )
 @click.option(
     "--port",
-    type=click.IntRange(1024, 65535 - 2 * OWN_PORT_OFFSET),
+    type=click.IntRange(1024, 65535 - OWN_PORT_OFFSET - MOST_VEHICLES),
     default=DEFAULT_PORT,
     show_default=True,
-    help="Vehicle i, from 0, sends to 127.0.0.1:PORT+i from PORT+40+i.",
+    help="Vehicle i, from 0, sends to UDP port PORT+i of this machine, from PORT+40+i.",
+)
+@click.option("--shared", is_flag=True, help="All vehicles send to PORT.")
+@click.option(
+    "--tcp",
+    type=click.IntRange(1024, 65535),
+    metavar="P",
+    help="Instead of UDP: vehicle i listens on TCP port P+10·i, and boots when a client comes.",
+)
+@click.option(
+    "--pty", is_flag=True, help="Instead of UDP: each vehicle on a pseudo-terminal, whose path is printed."
 )
 @click.option(
     "--home",
@@ -65,24 +107,85 @@ def parse_speed(context: click.Context, option: click.Parameter, speed: float) -
     metavar="LAT,LON,ALT",
     help="Where the first vehicle stands; the others stand 20 m apart to its east.",
 )
-def main(vehicles: int, autopilot: str, speed: float, port: int, home: tuple[float, float, float]) -> None:
+@click.option(
+    "--wind", callback=parse_wind, default="0,0", metavar="EAST,NORTH", help="A steady wind in m/s."
+)
+@click.option(
+    "--seed",
+    type=int,
+    help="Scatter altitudes and local origins as they differ between real vehicles; throw the faults' dice.",
+)
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="NAME@T",
+    help="Let something fail T s after boot, as [ID:]NAME[=VALUE]@T[+SECONDS]; may be given again. "
+    f"NAME: {', '.join(FAULTS)}.",
+)
+def main(
+    vehicles: int,
+    autopilots: list[str],
+    speed: float,
+    port: int,
+    shared: bool,
+    tcp: int | None,
+    pty: bool,
+    home: tuple[float, float, float],
+    wind: tuple[float, float],
+    seed: int | None,
+    faults: tuple[str, ...],
+) -> None:
     """Play multicopters that speak MAVLink 2, until Ctrl-C."""
+    if len(autopilots) not in (1, vehicles):
+        raise click.UsageError(f"--autopilot names {len(autopilots)} firmwares for {vehicles} vehicles")
+    check_links(vehicles, shared, tcp, pty)
     # Imported here, so that --help and mistakes are answered before the compiler is loaded.
+    from . import links
     from .fleet import StubFleet
-    from .links import serve
 
     pads = [(SPACING_M * index, 0.0) for index in range(vehicles)]
-    fleet = StubFleet(vehicles, origin=home, pads_m=pads, autopilot=autopilot)
+    each = autopilots * vehicles if len(autopilots) == 1 else autopilots
+    fleet = StubFleet(vehicles, origin=home, pads_m=pads, autopilot=each, wind_mps=wind, seed=seed)
+    try:
+        for fault in faults:
+            fleet.order(parse_order(fault))
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--fault") from None
     own_port = port + OWN_PORT_OFFSET
+    if tcp is not None:
+        opener, where = links.tcp(tcp, TCP_SPACING), f"tcp ports from {tcp} on"
+    elif pty:
+        opener, where = links.pty(say_terminal), "pseudo-terminals"
+    else:
+        opener = links.udp(port, own_port, shared)
+        where = f"from udp port {own_port} on, to {port}{'' if shared else ' on'}"
     click.echo(
-        f"{vehicles} {autopilot} vehicle(s): from udp port {own_port} on, to {port} on; Ctrl-C ends.",
-        err=True,
+        f"{vehicles} {', '.join(dict.fromkeys(autopilots))} vehicle(s): {where}; Ctrl-C ends.", err=True
     )
     try:
         with contextlib.suppress(KeyboardInterrupt):
-            asyncio.run(serve(fleet, port, own_port, speed))
+            asyncio.run(links.serve(fleet, opener, speed))
     except OSError as error:
-        raise click.UsageError(f"cannot use the ports from {own_port} on: {error.strerror}") from None
+        first = own_port if tcp is None else tcp
+        raise click.UsageError(f"cannot use the ports from {first} on: {error.strerror}") from None
+
+
+def check_links(vehicles: int, shared: bool, tcp: int | None, pty: bool) -> None:
+    """Raise UsageError for links that exclude each other or do not suffice."""
+    if shared + (tcp is not None) + pty > 1:
+        raise click.UsageError("only one of --shared, --tcp and --pty can be used")
+    if tcp is not None and tcp + TCP_SPACING * (vehicles - 1) > 65535:
+        raise click.UsageError(f"--tcp {tcp} leaves no ports for {vehicles} vehicles")
+    if vehicles > OWN_PORT_OFFSET and not (shared or tcp is not None or pty):
+        raise click.UsageError(
+            f"--vehicles {vehicles} need --shared, --tcp or --pty: UDP has {OWN_PORT_OFFSET} ports"
+        )
+
+
+def say_terminal(system: int, path: str) -> None:
+    """Tell where a vehicle can be reached."""
+    click.echo(f"vehicle {system}: {path}", err=True)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """COMMAND_LONG and COMMAND_INT as one thing, and those commands that every autopilot answers alike."""
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swarmctl.mavlink.codec import Frame
@@ -30,6 +31,7 @@ class Command(NamedTuple):
     z: float
     sender_system: int
     sender_component: int
+    frame: int = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
 
 
 def from_long(frame: Frame) -> Command:
@@ -47,7 +49,17 @@ def from_int(frame: Frame) -> Command:
     scale = 1e-7 if f.frame in DEGREE_FRAMES else 1.0
     x, y = (math.nan if value == NO_PLACE else value * scale for value in (f.x, f.y))
     return Command(
-        f.command, f.param1, f.param2, f.param3, f.param4, x, y, f.z, frame.system, frame.component
+        f.command, f.param1, f.param2, f.param3, f.param4, x, y, f.z, frame.system, frame.component, f.frame
+    )  # fmt: skip
+
+
+def from_set_mode(frame: Frame, split_mode: Callable[[int], tuple[float, float]]) -> Command:
+    """Read a SET_MODE as a DO_SET_MODE, whose parameters hold the mode's number in the firmware's way."""
+    f = frame.fields
+    main, sub = split_mode(f.custom_mode)
+    none = math.nan
+    return Command(
+        mav.MAV_CMD_DO_SET_MODE, f.base_mode, main, sub, none, none, none, none, frame.system, frame.component
     )  # fmt: skip
 
 
@@ -73,7 +85,25 @@ def request_message(vehicle: "StubVehicle", command: Command) -> int:
     return int(mav.MAV_RESULT_ACCEPTED)
 
 
+def get_message_interval(vehicle: "StubVehicle", command: Command) -> int:
+    """MAV_CMD_GET_MESSAGE_INTERVAL: the answer's MAV_RESULT."""
+    message_id = whole(command.p1)
+    if message_id is None or not 0 <= message_id <= 0xFFFF:
+        return int(mav.MAV_RESULT_FAILED)
+    interval = vehicle.interval_us(message_id)
+    vehicle.send_message(mav.MAVLink_message_interval_message(message_id, interval))
+    return int(mav.MAV_RESULT_ACCEPTED)
+
+
+def tell_version(vehicle: "StubVehicle", command: Command) -> int:
+    """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, the older way to ask for AUTOPILOT_VERSION."""
+    vehicle.send(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    return int(mav.MAV_RESULT_ACCEPTED)
+
+
 LINK_COMMANDS: dict[int, Any] = {
     mav.MAV_CMD_SET_MESSAGE_INTERVAL: set_message_interval,
+    mav.MAV_CMD_GET_MESSAGE_INTERVAL: get_message_interval,
     mav.MAV_CMD_REQUEST_MESSAGE: request_message,
+    mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: tell_version,
 }

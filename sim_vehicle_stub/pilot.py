@@ -22,6 +22,20 @@ class Limits:
     climb_acceleration_mps2: float = 3.0
     endurance_s: float | None = None
     """Seconds in the air that drain the battery; None: it never drains."""
+    braking_mps2: float | None = None
+    """None: as the acceleration."""
+    airspeed_mps: float | None = None
+    """What it can fly through the air, for the wind; None: a quarter more than its speed."""
+
+    @property
+    def braking(self) -> float:
+        """m/s²."""
+        return self.acceleration_mps2 if self.braking_mps2 is None else self.braking_mps2
+
+    @property
+    def airspeed(self) -> float:
+        """m/s."""
+        return 1.25 * self.speed_mps if self.airspeed_mps is None else self.airspeed_mps
 
 
 class Pilot:
@@ -30,6 +44,7 @@ class Pilot:
     def __init__(self, commands: Records, limits: Records, index: int) -> None:
         self.place = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         """east, north, up, and their rates: as they were at the last tick."""
+        self.broken = False
         self._index = index
         self._command = commands[index]
         self._limits = limits[index]
@@ -46,9 +61,15 @@ class Pilot:
 
     def power(self, on: bool) -> None:
         """Start the motors, standing still; or stop them."""
-        self._command["powered"] = int(on)
+        self._command["powered"] = int(on and not self.broken)
         self.velocity(0.0, 0.0)
         self.climb_rate(0.0)
+
+    def break_motors(self, broken: bool) -> None:
+        """Let the motors fail, whatever the firmware believes; or mend them, still stopped."""
+        self.broken = broken
+        if broken:
+            self._command["powered"] = 0
 
     def limit(self, name: str, value: float) -> None:
         """Set one limit of the body (a field of `bodies.LIMITS`)."""
@@ -74,6 +95,10 @@ class Pilot:
         self._east[index] = east
         self._north[index] = north
 
+    def drift(self) -> None:
+        """Go with the wind: there is no position to hold."""
+        self._aim[self._index] = bodies.DRIFT
+
     def climb_rate(self, up: float) -> None:
         """Climb at this rate (m/s)."""
         index = self._index
@@ -95,6 +120,6 @@ class Pilot:
         east, north, up, v_east, v_north, v_up = self.place
         limits = self._limits
         speed = math.sqrt(v_east * v_east + v_north * v_north)
-        ahead = limits["lag"] + speed / (2.0 * limits["acceleration"])
+        ahead = limits["lag"] + speed / (2.0 * limits["braking"])
         self.go_to(east + v_east * ahead, north + v_north * ahead)
         self.height(up + v_up * abs(v_up) / (2.0 * limits["climb_acceleration"]))

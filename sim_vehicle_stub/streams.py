@@ -3,13 +3,15 @@
 Times are integer microseconds, so that ten intervals of a tenth of a second are exactly one second.
 """
 
+from collections.abc import Mapping
+
 NEVER_US = 1 << 62
 
 
 class Streams:
     """The periodic messages of one vehicle."""
 
-    def __init__(self, intervals_us: dict[int, int], now_us: int) -> None:
+    def __init__(self, intervals_us: Mapping[int, int], now_us: int) -> None:
         self._defaults = intervals_us
         self._intervals = {
             message_id: interval for message_id, interval in intervals_us.items() if interval > 0

@@ -30,7 +30,12 @@ CAPABILITIES: int = (
     | mav.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
     | mav.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | mav.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mav.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mav.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mav.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
+EKF_LOCATED, EKF_UNLOCATED = 0x33F, 0x0A7
+NO_FIX = (0, 0, 0, 0, 0, 0, 0)
 Builder = Callable[["StubVehicle"], bytes | None]
 
 
@@ -48,13 +53,14 @@ def heartbeat(vehicle: "StubVehicle") -> bytes:
 
 
 def sys_status(vehicle: "StubVehicle") -> bytes:
-    """SYS_STATUS; the pre-arm bit is set in the health alone, as PX4 does."""
-    percent = vehicle.battery_percent
-    health = SENSORS if vehicle.located else SENSORS & ~mav.MAV_SYS_STATUS_SENSOR_GPS
+    """SYS_STATUS; PX4 sets the pre-arm bit in the health alone."""
+    percent = vehicle.battery.percent
+    health = SENSORS if vehicle.fixed else SENSORS & ~mav.MAV_SYS_STATUS_SENSOR_GPS
     if vehicle.personality.ready:
         health |= PREARM
+    shown = SENSORS | PREARM if vehicle.personality.shows_prearm else SENSORS
     return vehicle.encoder.sys_status(
-        SENSORS, SENSORS, health, 300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0
+        shown, shown, health, 300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0
     )
 
 
@@ -65,7 +71,7 @@ def _battery_mv(percent: float) -> int:
 
 def battery_status(vehicle: "StubVehicle") -> bytes:
     """BATTERY_STATUS."""
-    percent = vehicle.battery_percent
+    percent = vehicle.battery.percent
     cells = [_battery_mv(percent) // 4] * 4 + [0xFFFF] * 6
     return vehicle.encode(
         mav.MAVLink_battery_status_message(0, 0, 0, 0x7FFF, cells, -1, -1, -1, int(percent))
@@ -74,9 +80,10 @@ def battery_status(vehicle: "StubVehicle") -> bytes:
 
 def global_position_int(vehicle: "StubVehicle") -> bytes | None:
     """GLOBAL_POSITION_INT: what the body's place and speed are at this tick."""
-    if not vehicle.located:
+    wire = vehicle.wire if vehicle.located else vehicle.personality.unsure_position()
+    if wire is None:
         return None
-    return vehicle.encoder.global_position_int(vehicle.boot_ms, *vehicle.wire, vehicle.heading_cdeg)
+    return vehicle.encoder.global_position_int(vehicle.boot_ms, *wire, vehicle.heading_cdeg)
 
 
 def local_position_ned(vehicle: "StubVehicle") -> bytes | None:
@@ -136,6 +143,40 @@ def autopilot_version(vehicle: "StubVehicle") -> bytes:
     )  # fmt: skip
 
 
+def gps_raw_int(vehicle: "StubVehicle") -> bytes:
+    """GPS_RAW_INT: what the receiver says, before any estimate."""
+    lat, lon, alt, _, v_north, v_east, _ = vehicle.wire if vehicle.fixed else NO_FIX
+    fix = mav.GPS_FIX_TYPE_3D_FIX if vehicle.fixed else mav.GPS_FIX_TYPE_NO_FIX
+    speed = round(math.sqrt(v_north * v_north + v_east * v_east))
+    return vehicle.encode(
+        mav.MAVLink_gps_raw_int_message(
+            vehicle.boot_ms * 1000, fix, lat, lon, alt, 80, 80, speed, 0xFFFF, 12 if vehicle.fixed else 0
+        )
+    )
+
+
+def vfr_hud(vehicle: "StubVehicle") -> bytes:
+    """VFR_HUD."""
+    _, _, up, v_east, v_north, v_up = vehicle.pilot.place
+    speed = math.sqrt(v_east * v_east + v_north * v_north)
+    heading = vehicle.heading_cdeg // 100
+    throttle = 50 if vehicle.pilot.powered else 0
+    return vehicle.encode(
+        mav.MAVLink_vfr_hud_message(speed, speed, heading, throttle, vehicle.zero_amsl_m + up, v_up)
+    )
+
+
+def ekf_status_report(vehicle: "StubVehicle") -> bytes:
+    """EKF_STATUS_REPORT: with a position estimate or without one."""
+    flags = EKF_LOCATED if vehicle.located else EKF_UNLOCATED
+    return vehicle.encode(mav.MAVLink_ekf_status_report_message(flags, 0.05, 0.05, 0.05, 0.05, 0.0))
+
+
+def timesync(vehicle: "StubVehicle") -> bytes:
+    """TIMESYNC, as a question."""
+    return vehicle.encode(mav.MAVLink_timesync_message(0, vehicle.boot_ms * 1_000_000))
+
+
 BUILDERS: dict[int, Builder] = {
     mav.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mav.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
@@ -147,4 +188,8 @@ BUILDERS: dict[int, Builder] = {
     mav.MAVLINK_MSG_ID_HOME_POSITION: home_position,
     mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: gps_global_origin,
     mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT: gps_raw_int,
+    mav.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
+    mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: ekf_status_report,
+    mav.MAVLINK_MSG_ID_TIMESYNC: timesync,
 }

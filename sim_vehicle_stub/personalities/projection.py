@@ -1,6 +1,6 @@
-"""PX4's local projection: azimuthal equidistant about the vehicle's own origin, on a sphere.
+"""How firmwares project: PX4 azimuthal equidistant about the own origin on a sphere, ArduPilot on a plane.
 
-It differs from the fleet's WGS84 frame by 0.2 m at 100 m and 2 m at 1 km, as the real firmware's does.
+PX4 differs from the WGS84 frame of the fleet by 0.2 m at 100 m and 2 m at 1 km, as the real one does.
 """
 
 import math
@@ -30,3 +30,20 @@ def reproject(north: float, east: float, origin_lat: float, origin_lon: float) -
     lat = math.asin(math.cos(angle) * math.sin(phi_0) + north * sine * math.cos(phi_0))
     turn = math.atan2(east * sine, math.cos(phi_0) * math.cos(angle) - math.sin(phi_0) * north * sine)
     return math.degrees(lat), origin_lon + math.degrees(turn)
+
+
+FLAT_M_PER_DEGREE = 111318.84502145034
+"""What ArduPilot takes for a degree of latitude."""
+
+
+def to_flat(lat: float, lon: float, origin_lat: float, origin_lon: float) -> tuple[float, float]:
+    """North and east (m) of a place (degrees) as ArduPilot reckons them: on a plane about the origin."""
+    narrow = math.cos(math.radians((lat + origin_lat) / 2.0))
+    return (lat - origin_lat) * FLAT_M_PER_DEGREE, (lon - origin_lon) * FLAT_M_PER_DEGREE * narrow
+
+
+def from_flat(north: float, east: float, origin_lat: float, origin_lon: float) -> tuple[float, float]:
+    """Latitude and longitude (degrees) of a local place: the inverse of `to_flat`."""
+    lat = origin_lat + north / FLAT_M_PER_DEGREE
+    narrow = math.cos(math.radians((lat + origin_lat) / 2.0))
+    return lat, origin_lon + east / (FLAT_M_PER_DEGREE * narrow)

@@ -5,26 +5,28 @@ firmware remembers beside the mode it is in (which a failsafe may have chosen) t
 the ground.  Commands are in px4_commands.py, setpoints and what they mean in px4_setpoints.py.
 """
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from swarmctl.mavlink.codec import Frame
 from swarmctl.mavlink.dialect import mav
 
 from ..commands import Command
+from ..parameters import BYTEWISE
 from ..pilot import Limits
 from .projection import project
 from .px4_commands import ACCEPTED, COMMANDS, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
+from .px4_failsafes import Failsafes
+from .px4_return import ALTITUDE_ACCEPTED_M, Return
 from .px4_setpoints import Setpoints
 
 if TYPE_CHECKING:
     from ..vehicle import StubVehicle
 
 READY_AFTER_S = 4.5
+BOUND_LIMITS = {"MPC_XY_VEL_MAX": ("speed",), "MPC_ACC_HOR": ("acceleration", "braking", "approach")}
+"""The limits of the body that a parameter sets."""
 SPOOL_UP_S = 2.0
-ALTITUDE_ACCEPTED_M = 0.8
-PLACE_ACCEPTED_M = 1.0
 AUTO_BASE_MODE: int = (
     mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     | mav.MAV_MODE_FLAG_AUTO_ENABLED
@@ -44,8 +46,19 @@ class Px4:
     version = 0x011100FF  # 1.17.0, release
     capabilities: int = mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     base_mode = AUTO_BASE_MODE
+    LIMITS = Limits()
+    ENCODING = BYTEWISE
+    DATA_STREAMS: ClassVar[Mapping[int, tuple[int, ...]]] = {}
+    LOCATED_AFTER_S, HOME_AFTER_S, QUIET_FOR_S = 2.0, 3.0, 0.0
+    TEXT_END = "\t"
+    texts_need_gcs = True
+    requests_integers = True
+    answers_any_component = False
+    tells_parameter_errors = True
+    shows_prearm = False
+    announces_origin = True
 
-    INTERVALS_US: ClassVar = {
+    INTERVALS_US: ClassVar[Mapping[int, int]] = {
         mav.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
         mav.MAVLINK_MSG_ID_SYS_STATUS: 200_000,
         mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
@@ -60,10 +73,17 @@ class Px4:
     def parameters(limits: Limits) -> dict[str, float]:
         """The parameters at boot; an int is an INT32 for good, a float a REAL32."""
         return {
+            "BAT_CRIT_THR": 0.07,
+            "BAT_EMERGEN_THR": 0.05,
+            "BAT_LOW_THR": 0.15,
             "COM_DISARM_LAND": 2.0,
             "COM_DISARM_PRFLT": 10.0,
+            "COM_DL_LOSS_T": 10,
+            "COM_FAIL_ACT_T": 5.0,
+            "COM_LOW_BAT_ACT": 0,
             "COM_OF_LOSS_T": 1.0,
             "GF_ACTION": 2,
+            "MAV_SYS_ID": 1,
             "MIS_TAKEOFF_ALT": 2.5,
             "MPC_ACC_HOR": limits.acceleration_mps2,
             "MPC_LAND_SPEED": min(0.7, limits.descent_mps),
@@ -72,9 +92,15 @@ class Px4:
             "MPC_XY_VEL_MAX": limits.speed_mps,
             "MPC_Z_VEL_MAX_DN": limits.descent_mps,
             "MPC_Z_VEL_MAX_UP": limits.climb_mps,
+            "NAV_DLL_ACT": 0,
             "RTL_CONE_ANG": 45,
             "RTL_RETURN_ALT": 30.0,
         }
+
+    @staticmethod
+    def split_mode(number: int) -> tuple[float, float]:
+        """Main and sub mode."""
+        return float(number >> 16 & 0xFF), float(number >> 24)
 
     def __init__(self, vehicle: "StubVehicle") -> None:
         self.vehicle = vehicle
@@ -84,15 +110,18 @@ class Px4:
         self.mode = Mode.LOITER
         self._resting_mode = Mode.LOITER
         self._failsafe = False
+        self._resumes = False
+        self._failsafes = Failsafes(self)
         self._step: Callable[[Px4], None] = MODES[self.mode].step
-        self._rtl_phase = 0
+        self._return = Return(vehicle, self._begin_land)
         self.takeoff_height = 0.0
         self._lift_off_at: float | None = None
-        self._return_height = 0.0
         for name in ("MPC_XY_VEL_MAX", "MPC_ACC_HOR"):
             self.parameter_changed(name)
+        self._parameters.set("MAV_SYS_ID", vehicle.system)
         self._pilot.limit("climb_acceleration", vehicle.limits.climb_acceleration_mps2)
         self._pilot.limit("lag", vehicle.limits.lag_s)
+        self._pilot.limit("airspeed", vehicle.limits.airspeed)
 
     # What telemetry tells
 
@@ -115,16 +144,27 @@ class Px4:
             return int(mav.MAV_LANDED_STATE_ON_GROUND)
         if self.mode is Mode.TAKEOFF:
             return int(mav.MAV_LANDED_STATE_TAKEOFF)
-        if self.mode is Mode.LAND or (self.mode is Mode.RTL and self._rtl_phase == len(RTL_PHASES) - 1):
+        if self.mode is Mode.LAND or (self.mode is Mode.RTL and self._return.landing):
             return int(mav.MAV_LANDED_STATE_LANDING)
         return int(mav.MAV_LANDED_STATE_IN_AIR)
 
     @property
     def ready(self) -> bool:
         """Whether it could be armed: a while after boot, and in OFFBOARD only with a stream."""
-        return self.vehicle.since_boot >= READY_AFTER_S and (
-            self.mode is not Mode.OFFBOARD or self._setpoints.streaming
+        return (
+            self.vehicle.since_boot >= READY_AFTER_S
+            and (self.mode is not Mode.OFFBOARD or self._setpoints.streaming)
+            and self.vehicle.located
+            and "arming-refused" not in self.vehicle.faults
+            and not self._failsafes.misses_ground_station
         )
+
+    def unsure_position(self) -> None:
+        """Nothing is told of a position that is not known."""
+
+    def is_ground_station(self, system: int) -> bool:
+        """Any will do."""
+        return True
 
     def local_ned(self) -> tuple[float, float, float]:
         """North, east, down (m) from the vehicle's own origin, in PX4's projection."""
@@ -152,6 +192,7 @@ class Px4:
             )
             vehicle.disarm()
         else:
+            self._failsafes.watch()
             self._step(self)
 
     def _disarm_is_due(self) -> bool:
@@ -203,43 +244,17 @@ class Px4:
             self._pilot.height(self.takeoff_height)
 
     def _begin_land(self) -> None:
-        self._pilot.hold()
+        if self.vehicle.located:
+            self._pilot.hold()
+        else:
+            self._pilot.drift()
         self._pilot.descend()
 
     def _begin_rtl(self) -> None:
-        self._rtl_phase = 0
-        RTL_PHASES[0].begin(self)
+        self._return.begin()
 
     def _step_rtl(self) -> None:
-        if RTL_PHASES[self._rtl_phase].done(self):
-            self._rtl_phase += 1
-            RTL_PHASES[self._rtl_phase].begin(self)
-
-    def _climb_to_return(self) -> None:
-        """Climb to the return altitude, or lower when home is near: a cone stands on it."""
-        self._pilot.hold()
-        cone = math.radians(max(self._parameters["RTL_CONE_ANG"], 1))
-        allowed = min(self._home_distance() / math.tan(cone), self._parameters["RTL_RETURN_ALT"])
-        self._return_height = max(allowed, self._pilot.place[2])
-        self._pilot.height(self._return_height)
-
-    def _at_return_height(self) -> bool:
-        return self._pilot.place[2] >= self._return_height - ALTITUDE_ACCEPTED_M
-
-    def _fly_home(self) -> None:
-        self._pilot.go_to(*self.vehicle.home_place)
-
-    def _over_home(self) -> bool:
-        return self._home_distance() <= PLACE_ACCEPTED_M
-
-    def _never(self) -> bool:
-        return False
-
-    def _home_distance(self) -> float:
-        """Horizontal metres to home."""
-        east, north = self.vehicle.home_place
-        d_east, d_north = self._pilot.place[0] - east, self._pilot.place[1] - north
-        return math.sqrt(d_east * d_east + d_north * d_north)
+        self._return.step()
 
     def _begin_offboard(self) -> None:
         self._setpoints.fly_last()
@@ -247,8 +262,8 @@ class Px4:
     def _step_offboard(self) -> None:
         if self._setpoints.lost:
             self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Failsafe activated: no offboard signal, RTL")
-            self._enter(Mode.RTL)
-            self._failsafe = True
+            self.fail_into(Mode.RTL)
+            self._resumes = True
 
     def _nothing(self) -> None:
         """A mode in which time alone changes nothing."""
@@ -266,12 +281,12 @@ class Px4:
             self._follow()
 
     def _follow(self) -> None:
-        if not self.vehicle.armed:
+        if not self.vehicle.armed or "ignored-setpoints" in self.vehicle.faults:
             return
         if self.mode is Mode.OFFBOARD:
             self._setpoints.fly_last()
-        elif self._failsafe:
-            self._failsafe = False
+        elif self._resumes:
+            self._end_failsafe()
             self._enter(Mode.OFFBOARD)
 
     # Commands
@@ -285,14 +300,26 @@ class Px4:
         """A mode asked for by a command: the result."""
         if mode is not Mode.OFFBOARD and self.vehicle.home is None:
             return TEMPORARILY_REJECTED
+        if self.vehicle.armed and not self.vehicle.located and mode is not Mode.LAND:
+            return TEMPORARILY_REJECTED
         if mode is Mode.OFFBOARD and self.vehicle.armed and not self._setpoints.streaming:
             self.vehicle.say(
                 mav.MAV_SEVERITY_CRITICAL, "Switching to mode 'Offboard' is currently not possible"
             )
             return TEMPORARILY_REJECTED
-        self._failsafe = False
-        self._enter(mode)
+        if "stuck-mode" not in self.vehicle.faults:
+            self._end_failsafe()
+            self._enter(mode)
         return ACCEPTED
+
+    def fail_into(self, mode: Mode) -> None:
+        """A failsafe chooses the mode, until one is ordered."""
+        self._enter(mode)
+        self._failsafe, self._resumes = True, False
+
+    def _end_failsafe(self) -> None:
+        self._failsafe = self._resumes = False
+        self._failsafes.cancel()
 
     def arm(self) -> int:
         """Arm, if ready, and begin the mode that it is in: the result."""
@@ -300,6 +327,7 @@ class Px4:
             self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Arming denied: Resolve system health failures first")
             return TEMPORARILY_REJECTED
         self.vehicle.arm()
+        self._failsafes.forget()
         self._enter(self.mode)
         return ACCEPTED
 
@@ -307,14 +335,13 @@ class Px4:
 
     def parameter_changed(self, name: str) -> None:
         """Limits take effect at once."""
-        limit = {"MPC_XY_VEL_MAX": "speed", "MPC_ACC_HOR": "acceleration"}.get(name)
-        if limit is not None:
+        for limit in BOUND_LIMITS.get(name, ()):
             self._pilot.limit(limit, self._parameters[name])
         self._pace()
 
     def disarmed(self) -> None:
         """Back to the mode before landing, which may be OFFBOARD."""
-        self._failsafe = False
+        self._end_failsafe()
         self._enter(self._resting_mode)
 
 
@@ -325,13 +352,6 @@ class ModeRow(NamedTuple):
     step: Callable[[Px4], None]
 
 
-class Phase(NamedTuple):
-    """A part of the return: how it begins and when it is over."""
-
-    begin: Callable[[Px4], None]
-    done: Callable[[Px4], bool]
-
-
 MODES = {
     Mode.LOITER: ModeRow(Px4._begin_loiter, Px4._nothing),
     Mode.TAKEOFF: ModeRow(Px4._begin_takeoff, Px4._step_takeoff),
@@ -339,9 +359,3 @@ MODES = {
     Mode.RTL: ModeRow(Px4._begin_rtl, Px4._step_rtl),
     Mode.LAND: ModeRow(Px4._begin_land, Px4._nothing),
 }
-
-RTL_PHASES = (
-    Phase(Px4._climb_to_return, Px4._at_return_height),
-    Phase(Px4._fly_home, Px4._over_home),
-    Phase(Px4._begin_land, Px4._never),
-)

@@ -46,8 +46,8 @@ def set_mode(px4: "Px4", command: Command) -> int:
 
 def takeoff(px4: "Px4", command: Command) -> int:
     """Up to an altitude above sea level, whatever frame the command names."""
-    ground = px4.vehicle.fleet_origin[2]
-    px4.takeoff_height = command.z - ground if math.isfinite(command.z) else px4.default_takeoff_height
+    zero = px4.vehicle.zero_amsl_m
+    px4.takeoff_height = command.z - zero if math.isfinite(command.z) else px4.default_takeoff_height
     return px4.order(Mode.TAKEOFF)
 
 
@@ -77,7 +77,7 @@ def reposition(px4: "Px4", command: Command) -> int:
         if math.isfinite(command.x) and math.isfinite(command.y):
             vehicle.pilot.go_to(*to_local(command.x, command.y, *vehicle.fleet_origin))
         if math.isfinite(command.z):
-            vehicle.pilot.height(command.z - vehicle.fleet_origin[2])
+            vehicle.pilot.height(command.z - vehicle.zero_amsl_m)
     return result
 
 
@@ -96,6 +96,14 @@ def arm_or_disarm(px4: "Px4", command: Command) -> int:
     return ACCEPTED
 
 
+def reboot(px4: "Px4", command: Command) -> int:
+    """Start anew, unless armed."""
+    if px4.vehicle.armed or command.p1 != 1.0:
+        return DENIED
+    px4.vehicle.reboot()
+    return ACCEPTED
+
+
 COMMANDS: dict[int, Callable[["Px4", Command], int]] = {
     mav.MAV_CMD_DO_SET_MODE: set_mode,
     mav.MAV_CMD_COMPONENT_ARM_DISARM: arm_or_disarm,
@@ -104,4 +112,5 @@ COMMANDS: dict[int, Callable[["Px4", Command], int]] = {
     mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: return_home,
     mav.MAV_CMD_NAV_LOITER_UNLIM: loiter,
     mav.MAV_CMD_DO_REPOSITION: reposition,
+    mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot,
 }

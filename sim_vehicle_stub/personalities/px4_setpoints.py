@@ -95,7 +95,7 @@ class Setpoints:
             place = to_local(lat, lon, *vehicle.fleet_origin)
         height = None
         if not in_body and not mask & NO_Z and math.isfinite(z):
-            height = vehicle.local_origin[2] - z - vehicle.fleet_origin[2]
+            height = vehicle.local_origin[2] - z - vehicle.zero_amsl_m
         self._steer(setpoint, place, height, v_east, v_north)
 
     def _fly_global(self, setpoint: Any) -> None:
@@ -109,7 +109,7 @@ class Setpoints:
             base = 0.0
             if setpoint.coordinate_frame in RELATIVE_FRAMES and vehicle.home is not None:
                 base = vehicle.home[2]
-            height = setpoint.alt + base - vehicle.fleet_origin[2]
+            height = setpoint.alt + base - vehicle.zero_amsl_m
         self._steer(setpoint, place, height, setpoint.vy, setpoint.vx)
 
     def _steer(

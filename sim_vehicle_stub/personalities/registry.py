@@ -1,9 +1,14 @@
 """The firmwares that the stub can play, by name."""
 
+from .ardupilot import ArduPilot, ArduPilot46
 from .base import Personality
 from .px4 import Px4
 
-PERSONALITIES: dict[str, type[Personality]] = {"px4": Px4}
+PERSONALITIES: dict[str, type[Personality]] = {
+    "px4": Px4,
+    "ardupilot": ArduPilot,
+    "ardupilot-4.6": ArduPilot46,
+}
 
 
 def personality_named(name: str) -> type[Personality]:

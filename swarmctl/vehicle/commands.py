@@ -1,10 +1,11 @@
 """MAVLink commands as values, with names that a reader of a failure understands."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from swarmctl.mavlink.dialect import mav
 
+AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 CUSTOM_MODE_ENABLED: int = mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED: int = mav.MAV_RESULT_TEMPORARILY_REJECTED
@@ -13,12 +14,42 @@ IN_PROGRESS: int = mav.MAV_RESULT_IN_PROGRESS
 Parameters = tuple[float, float, float, float, float, float, float]
 
 
+class Ask(Protocol):
+    """What is sent to bring something about, and sent again until the vehicle shows that it has."""
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+
+    def messages(self, system: int, confirmation: int) -> tuple[Any, ...]:
+        """The messages to the vehicle ``system``, asked for the (``confirmation`` + 1)th time."""
+
+
 class Command(NamedTuple):
     """A COMMAND_LONG: its MAV_CMD number, its seven parameters, and a name for reports."""
 
     number: int
     parameters: Parameters
     name: str
+
+    def messages(self, system: int, confirmation: int) -> tuple[Any, ...]:
+        """The command itself."""
+        return (
+            mav.MAVLink_command_long_message(
+                system, AUTOPILOT_COMPONENT, self.number, min(confirmation, 255), *self.parameters
+            ),
+        )
+
+
+class Several(NamedTuple):
+    """Asks for several things at once."""
+
+    name: str
+    asks: tuple[Ask, ...]
+
+    def messages(self, system: int, confirmation: int) -> tuple[Any, ...]:
+        """All their messages."""
+        return tuple(message for ask in self.asks for message in ask.messages(system, confirmation))
 
 
 def command(name: str, number: int, *parameters: float) -> Command:

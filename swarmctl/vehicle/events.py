@@ -14,6 +14,9 @@ class EventKind(Enum):
     RELEASED = "released"  #: somebody else flies the vehicle now
     LOST = "lost"  #: no heartbeat
     REGAINED = "regained"  #: heartbeats again
+    POSITION_LOST = "position lost"  #: heartbeats, but no valid position
+    BATTERY_LOW = "battery low"  #: once a set-up
+    RESTARTED = "restarted"  #: the autopilot has booted again
     WARNING = "warning"  #: something optional did not work
     TEXT = "text"  #: STATUSTEXT of the vehicle
 

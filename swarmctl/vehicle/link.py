@@ -1,19 +1,22 @@
 """One vehicle's end of the wire: frames in, frames out, and the record of both.
 
 Only the vehicle's own frames pass.  A frame that comes twice is recorded but not passed on, or an old
-COMMAND_ACK would answer a new command.  Nor is one that was overtaken on the way, if it tells the vehicle's
-state: an old HEARTBEAT would show a mode that is no more.
+COMMAND_ACK would answer a new command.  Nor is one that tells the vehicle's state if a newer one of its kind
+overtook it on the way: an old HEARTBEAT would show a mode that is no more.
 """
+
+from typing import Any
 
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
 
-AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
+from .commands import AUTOPILOT_COMPONENT
+
 GROUND_SYSTEM = 255  #: the only system id that ArduPilot takes for its ground station
 GROUND_COMPONENT: int = mav.MAV_COMP_ID_MISSIONPLANNER
 
 # A frame less than this many numbers behind the newest is late; more means that the sender restarted.
-LATE_FRAMES = 32
+LATE_FRAMES = 48
 _WINDOW = (1 << LATE_FRAMES) - 1
 
 # Messages of which only the newest is true.
@@ -38,6 +41,8 @@ class Link:
         self.late = 0
         self._decoder = Decoder()
         self._newest: int | None = None
+        self._count = 0  # the newest frame's number, counted on beyond the wire's 255
+        self._told: dict[int, int] = {}  # message id → the number of the newest frame of its kind
         self._seen = 0  # bit k: the frame k numbers behind the newest has come
         self._outgoing: list[bytes] = []
         self._traffic: list[bytes] = []
@@ -65,17 +70,28 @@ class Link:
         return passed
 
     def _is_news(self, frame: Frame) -> bool:
-        """Whether a frame has not come before, nor tells of a state that a newer one may have told."""
+        """Whether a frame has not come before, nor tells of a state that a newer one has told."""
         newest = self._newest
         behind = LATE_FRAMES if newest is None else (newest - frame.sequence) & 0xFF
         if behind >= LATE_FRAMES:
-            self._seen = (self._seen << (-behind & 0xFF) | 1) & _WINDOW
+            ahead = -behind & 0xFF
+            self._seen = (self._seen << ahead | 1) & _WINDOW
             self._newest = frame.sequence
+            self._count += ahead
+            self._told[frame.message_id] = self._count
             return True
+        return self._is_late_news(frame.message_id, behind)
+
+    def _is_late_news(self, message_id: int, behind: int) -> bool:
+        """The same for a frame that comes after one of a higher number."""
         self.late += 1
         repeated = self._seen >> behind & 1
         self._seen |= 1 << behind
-        return not repeated and frame.message_id not in STATE_MESSAGES
+        number = self._count - behind
+        if repeated or (message_id in STATE_MESSAGES and number < self._told.get(message_id, number)):
+            return False
+        self._told[message_id] = max(number, self._told.get(message_id, number))
+        return True
 
     def expect_any(self) -> None:
         """Take the next frame whatever its number: after a silence the sender may have restarted."""
@@ -85,6 +101,15 @@ class Link:
         """Queue a frame."""
         self._outgoing.append(frame)
         self._traffic.append(frame)
+
+    def send_message(self, message: Any) -> None:
+        """Queue a pymavlink message."""
+        self.send(self.encoder.encode(message))
+
+    def send_heartbeat(self) -> None:
+        """Queue a ground station's HEARTBEAT."""
+        beat = (mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE)
+        self.send(self.encoder.heartbeat(*beat))
 
     def outgoing(self) -> list[bytes]:
         """The queued frames, which are then forgotten."""

@@ -16,15 +16,18 @@ class Phase(Enum):
     IDENTIFYING = "identifying"  #: which autopilot, which version
     CONFIGURING = "configuring"  #: message rates
     POSITIONING = "positioning"  #: position, origin, home, health
+    CHECKING = "checking"  #: parameters, and the vehicle's own fence, if the caller wants
     READY = "ready"  #: on the ground; may take off
     TAKING_OFF = "taking off"
     HOLDING = "holding"  #: at altitude, in the firmware's own hold
     ENGAGING = "engaging"  #: hold setpoints flow, offboard mode is asked for
     ENGAGED = "engaged"  #: flies the caller's setpoints
+    STOPPING = "stopping"  #: hold setpoints flow, the firmware's own hold is asked for
+    RELEASING = "releasing"  #: the same, to leave the vehicle to somebody else
     LANDING = "landing"
     LANDED = "landed"  #: on the ground, disarmed
     FAILED = "failed"  #: gave up, for a reason
-    RELEASED = "released"  #: somebody else changed the mode; never fought
+    RELEASED = "released"  #: somebody else flies it, by order or because the mode changed; never fought
     LOST = "lost"  #: no heartbeat
 
 
@@ -36,9 +39,15 @@ class Signal(Enum):
     STEP_FAILED = "step failed"
     TAKE_OFF = "order: take off"
     ENGAGE = "order: engage"
+    HOLD = "order: hold"
     LAND = "order: land"
+    RELEASE = "order: release"
+    RETAKE = "order: retake"
     MODE_TAKEN = "mode changed by another"
     DISARMED = "disarmed"
+    CAME_DOWN = "on the ground unasked"
+    POSITION_LOST = "position lost"
+    RESTARTED = "autopilot restarted"
     LINK_LOST = "link lost"
     LINK_BACK_IN_SET_UP = "link back, had been setting up"
     LINK_BACK_IN_FLIGHT = "link back, had been flying"
@@ -50,8 +59,11 @@ class Action(Enum):
     IDENTIFY = "identify"
     CONFIGURE = "configure"
     LOCATE = "locate"
+    CHECK = "check"
     TAKE_OFF = "take_off"
     ENGAGE = "engage"
+    RETAKE = "retake"
+    STOP = "stop"
     LAND = "land"
     REST = "rest"
     FAIL = "fail"
@@ -67,15 +79,20 @@ class Transition(NamedTuple):
     phase: Phase | None
 
 
-SET_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.READY)
-AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGING, Phase.ENGAGED)
-STEPPING = (
+SET_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.CHECKING, Phase.READY)
+STREAMING = (Phase.ENGAGING, Phase.STOPPING, Phase.RELEASING)
+AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGED, *STREAMING)
+FLYING = (*AIRBORNE, Phase.LANDING)
+FAILING = (
     Phase.IDENTIFYING,
     Phase.CONFIGURING,
     Phase.POSITIONING,
+    Phase.CHECKING,
     Phase.TAKING_OFF,
     Phase.ENGAGING,
+    Phase.STOPPING,
     Phase.LANDING,
+    Phase.LOST,  # in which a landing goes on
 )
 
 Table = dict[tuple[Phase, Signal], Transition]
@@ -87,21 +104,36 @@ def _table() -> Table:
         (Phase.CONNECTING, Signal.HEARTBEAT): Transition(Action.IDENTIFY, Phase.IDENTIFYING),
         (Phase.IDENTIFYING, Signal.STEPS_DONE): Transition(Action.CONFIGURE, Phase.CONFIGURING),
         (Phase.CONFIGURING, Signal.STEPS_DONE): Transition(Action.LOCATE, Phase.POSITIONING),
-        (Phase.POSITIONING, Signal.STEPS_DONE): Transition(Action.REST, Phase.READY),
+        (Phase.POSITIONING, Signal.STEPS_DONE): Transition(Action.CHECK, Phase.CHECKING),
+        (Phase.CHECKING, Signal.STEPS_DONE): Transition(Action.REST, Phase.READY),
         (Phase.READY, Signal.TAKE_OFF): Transition(Action.TAKE_OFF, Phase.TAKING_OFF),
         (Phase.TAKING_OFF, Signal.STEPS_DONE): Transition(Action.REST, Phase.HOLDING),
         (Phase.HOLDING, Signal.ENGAGE): Transition(Action.ENGAGE, Phase.ENGAGING),
         (Phase.ENGAGING, Signal.STEPS_DONE): Transition(Action.REST, Phase.ENGAGED),
+        (Phase.STOPPING, Signal.STEPS_DONE): Transition(Action.REST, Phase.HOLDING),
+        (Phase.RELEASING, Signal.STEPS_DONE): Transition(Action.RELEASE, Phase.RELEASED),
+        (Phase.RELEASING, Signal.STEP_FAILED): Transition(Action.RELEASE, Phase.RELEASED),
         (Phase.LANDING, Signal.STEPS_DONE): Transition(Action.REST, Phase.LANDED),
+        (Phase.LANDING, Signal.RELEASE): Transition(Action.RELEASE, Phase.RELEASED),
+        (Phase.RELEASED, Signal.RETAKE): Transition(Action.RETAKE, Phase.ENGAGING),
+        (Phase.LOST, Signal.STEPS_DONE): Transition(Action.REST, Phase.LANDED),
+        (Phase.LOST, Signal.LAND): Transition(Action.LAND, Phase.LANDING),
         (Phase.LOST, Signal.LINK_BACK_IN_SET_UP): Transition(Action.IDENTIFY, Phase.IDENTIFYING),
         (Phase.LOST, Signal.LINK_BACK_IN_FLIGHT): Transition(Action.RESUME, None),
     }
     shared: tuple[tuple[tuple[Phase, ...], Signal, Action, Phase], ...] = (
-        (STEPPING, Signal.STEP_FAILED, Action.FAIL, Phase.FAILED),
+        (FAILING, Signal.STEP_FAILED, Action.FAIL, Phase.FAILED),
+        ((Phase.ENGAGING, Phase.ENGAGED), Signal.HOLD, Action.STOP, Phase.STOPPING),
         ((*AIRBORNE, Phase.FAILED), Signal.LAND, Action.LAND, Phase.LANDING),
-        (AIRBORNE, Signal.DISARMED, Action.FAIL, Phase.FAILED),
-        ((*AIRBORNE, Phase.LANDING), Signal.MODE_TAKEN, Action.RELEASE, Phase.RELEASED),
-        ((*SET_UP, *AIRBORNE, Phase.LANDING, Phase.RELEASED), Signal.LINK_LOST, Action.SUSPEND, Phase.LOST),
+        (AIRBORNE, Signal.RELEASE, Action.STOP, Phase.RELEASING),
+        (AIRBORNE, Signal.POSITION_LOST, Action.LAND, Phase.LANDING),
+        ((Phase.READY,), Signal.POSITION_LOST, Action.IDENTIFY, Phase.IDENTIFYING),
+        (SET_UP, Signal.RESTARTED, Action.IDENTIFY, Phase.IDENTIFYING),
+        (FLYING, Signal.RESTARTED, Action.FAIL, Phase.FAILED),
+        ((Phase.HOLDING, Phase.ENGAGED, *STREAMING), Signal.CAME_DOWN, Action.FAIL, Phase.FAILED),
+        (FLYING, Signal.DISARMED, Action.FAIL, Phase.FAILED),
+        (FLYING, Signal.MODE_TAKEN, Action.RELEASE, Phase.RELEASED),
+        ((*SET_UP, *FLYING, Phase.RELEASED), Signal.LINK_LOST, Action.SUSPEND, Phase.LOST),
     )
     for phases, signal, action, then in shared:
         table.update({(phase, signal): Transition(action, then) for phase in phases})

@@ -7,7 +7,7 @@ Nothing that telemetry can show is taken on the word of a COMMAND_ACK; message r
 from swarmctl.mavlink.dialect import mav
 
 from .autopilots.adapter import Adapter
-from .commands import disarm, message_interval, request_message
+from .commands import Several, disarm, message_interval, request_message
 from .settings import SessionSettings
 from .steps import Condition, OnFailure, Step
 from .telemetry import Telemetry
@@ -18,12 +18,13 @@ IN_AIR: int = mav.MAV_LANDED_STATE_IN_AIR
 Steps = tuple[Step, ...]
 
 
-def wanted_rates(settings: SessionSettings) -> dict[int, float]:
-    """Message id → Hz of what the session reads, besides HEARTBEAT."""
+def wanted_rates(adapter: Adapter, settings: SessionSettings) -> dict[int, float]:
+    """Message id → Hz of what the session and its adapter read, besides HEARTBEAT."""
     return {
         mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: settings.rate_hz,
         mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: settings.status_rate_hz,
         mav.MAVLINK_MSG_ID_SYS_STATUS: settings.status_rate_hz,
+        **adapter.extra_rates,
     }
 
 
@@ -43,25 +44,55 @@ def identifying(settings: SessionSettings) -> Steps:
 def configuring(adapter: Adapter, settings: SessionSettings) -> Steps:
     """The rates of what is read; off with what is not: a firmware refuses that for messages it lacks."""
     patience = settings.command_patience_s
-    rates = wanted_rates(settings)
-    wanted = [Step("message rates", patience, command=message_interval(i, hz)) for i, hz in rates.items()]
     unwanted = [
         Step("message rates", patience, command=message_interval(i, 0.0), on_failure=OnFailure.IGNORE)
         for i in adapter.unwanted_messages
     ]
-    return (*wanted, *unwanted)
+    return (*_rates(adapter, settings, OnFailure.FAIL), *unwanted)
 
 
-def positioning(settings: SessionSettings) -> Steps:
-    """Every message that flight needs has come, and the vehicle stands on the ground, ready to arm."""
-    return (
-        _streamed("position", mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, settings, lambda t: t.positioned),
-        _streamed("standing", mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, settings, _stands),
-        _streamed("system status", mav.MAVLINK_MSG_ID_SYS_STATUS, settings, lambda t: t.status_received),
-        _requested("origin", mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, settings, lambda t: t.origin is not None),
-        _requested("home", mav.MAVLINK_MSG_ID_HOME_POSITION, settings, lambda t: t.home is not None),
-        Step("ready to arm", settings.ready_patience_s, confirmed=lambda t: t.healthy and not t.armed),
+def _rates(adapter: Adapter, settings: SessionSettings, on_failure: OnFailure) -> Steps:
+    """Ask for the rates of what is read."""
+    patience = settings.command_patience_s
+    return tuple(
+        Step("message rates", patience, command=message_interval(i, hz), on_failure=on_failure)
+        for i, hz in wanted_rates(adapter, settings).items()
     )
+
+
+def positioning(adapter: Adapter, settings: SessionSettings) -> Steps:
+    """Every message that flight needs has come, and the vehicle stands on the ground, ready to arm."""
+    patience = settings.ready_patience_s
+    rates = wanted_rates(adapter, settings)
+    origin = _requested(
+        "origin", mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, patience, lambda t: t.origin is not None
+    )
+
+    def streamed(name: str, message_id: int, confirmed: Condition) -> Step:
+        """A message that should come by itself; its rate is asked for again when it does not."""
+        command = message_interval(message_id, rates[message_id])
+        wait = settings.confirm_timeout_s
+        return Step(name, patience, command=command, confirmed=confirmed, wait_s=wait, insists=True)
+
+    return (
+        streamed("position", mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, lambda t: t.positioned),
+        streamed("standing", mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, _stands),
+        streamed("system status", mav.MAVLINK_MSG_ID_SYS_STATUS, lambda t: t.status_received),
+        *((origin,) if adapter.needs_origin else ()),
+        _requested("home", mav.MAVLINK_MSG_ID_HOME_POSITION, patience, lambda t: t.home is not None),
+        *adapter.prepare(settings),
+        _gate(adapter, settings),
+    )
+
+
+def _gate(adapter: Adapter, settings: SessionSettings) -> Step:
+    """Ready to arm; what the adapter tells that by is asked for again now and then."""
+    asks = tuple(message_interval(i, hz) for i, hz in adapter.extra_rates.items())
+    pause = settings.reminder_s
+    return Step(
+        "ready to arm", settings.ready_patience_s, command=Several("message rates", asks) if asks else None,
+        confirmed=lambda t: t.healthy and not t.armed, wait_s=pause, answer_s=pause, insists=True,
+    )  # fmt: skip
 
 
 def _stands(telemetry: Telemetry) -> bool:
@@ -69,18 +100,9 @@ def _stands(telemetry: Telemetry) -> bool:
     return telemetry.landed_state == ON_GROUND
 
 
-def _streamed(name: str, message_id: int, settings: SessionSettings, confirmed: Condition) -> Step:
-    """A message that should come by itself; its rate is asked for again when it does not."""
-    command = message_interval(message_id, wanted_rates(settings)[message_id])
-    patience = settings.ready_patience_s
-    wait = settings.confirm_timeout_s
-    return Step(name, patience, command=command, confirmed=confirmed, wait_s=wait, insists=True)
-
-
-def _requested(name: str, message_id: int, settings: SessionSettings, confirmed: Condition) -> Step:
+def _requested(name: str, message_id: int, patience_s: float, confirmed: Condition) -> Step:
     """A message that comes when asked for, but only once the vehicle knows its content."""
-    command = request_message(message_id)
-    return Step(name, settings.ready_patience_s, command=command, confirmed=confirmed, insists=True)
+    return Step(name, patience_s, command=request_message(message_id), confirmed=confirmed, insists=True)
 
 
 def taking_off(adapter: Adapter, telemetry: Telemetry, altitude_m: float, settings: SessionSettings) -> Steps:
@@ -106,10 +128,13 @@ def taking_off(adapter: Adapter, telemetry: Telemetry, altitude_m: float, settin
     return (*adapter.take_off(telemetry, altitude_m, settings), climb)
 
 
-def engaging(adapter: Adapter, settings: SessionSettings) -> Steps:
-    """Hold setpoints flow for a while, then the mode is changed."""
+def engaging(adapter: Adapter, settings: SessionSettings, retaking: bool = False) -> Steps:
+    """Hold setpoints flow for a while, then the mode is changed.
+
+    ``retaking``: from whatever mode somebody else chose.
+    """
     modes = adapter.modes
-    ours = frozenset((modes.take_off, modes.hold, modes.engaged))
+    ours = None if retaking else frozenset((modes.take_off, modes.hold, modes.engaged))
     return (
         Step("setpoint stream", settings.command_patience_s, wait_s=settings.stream_s, modes=ours),
         Step(
@@ -122,12 +147,27 @@ def engaging(adapter: Adapter, settings: SessionSettings) -> Steps:
     )
 
 
-def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings) -> Steps:
+def stopping(adapter: Adapter, settings: SessionSettings) -> Steps:
+    """The firmware's own hold; hold setpoints flow until it is in that mode."""
+    modes = adapter.modes
+    return (
+        Step(
+            "hold mode",
+            settings.command_patience_s,
+            command=adapter.set_mode(modes.hold),
+            confirmed=lambda t: t.mode == modes.hold,
+            modes=frozenset((modes.take_off, modes.hold, modes.engaged)),
+            insists=True,
+        ),
+    )
+
+
+def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings, ask_rates: bool) -> Steps:
     """Land here, disarm if the firmware does not, and leave a mode from which arming is harmless.
 
     On disarming, PX4 falls back to an earlier mode; were that offboard, a vehicle that is armed while
     setpoints flow would fly.  The land mode is asked for even of a vehicle that stands disarmed: an ARM may
-    still be on its way.
+    still be on its way.  ``ask_rates``: the vehicle may have forgotten which messages we want.
     """
     modes = adapter.modes
     patience = settings.command_patience_s
@@ -135,10 +175,12 @@ def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings) -
     return (
         Step(
             "land mode",
-            patience,
+            settings.landing_patience_s,
             command=adapter.set_mode(modes.land),
             confirmed=lambda t: t.mode == modes.land,
+            insists=True,
         ),
+        *(_rates(adapter, settings, OnFailure.IGNORE) if ask_rates else ()),
         Step(
             "touch-down",
             settings.landing_patience_s + descent_s,
@@ -154,10 +196,10 @@ def landing(adapter: Adapter, telemetry: Telemetry, settings: SessionSettings) -
             insists=True,
         ),
         Step(
-            "hold mode after landing",
+            "parked",
             patience,
-            command=adapter.set_mode(modes.hold),
-            confirmed=lambda t: t.mode == modes.hold,
+            command=adapter.set_mode(modes.parked),
+            confirmed=lambda t: t.mode == modes.parked,
             on_failure=OnFailure.WARN,
         ),
     )

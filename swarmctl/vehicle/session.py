@@ -6,34 +6,38 @@ times are the caller's, in seconds of any monotonic clock; orders happen at the 
 or ``poll``.  What the session does is a walk through the table in ``phases``; what a firmware wants
 differently is in its adapter.
 
-When the vehicle's heartbeat is missing the phase is LOST: no setpoint is sent, so the firmware's own
-failsafe takes over.  When it is back, a vehicle that was being set up is set up again from the start, for it
-may have restarted; one that was flying has the phase that it had, and what telemetry then shows decides: in
-the mode it had, it goes on; in another (the failsafe's), it is RELEASED; disarmed, it FAILED.
+What happens in the air, and what the session does about it:
+
+- The vehicle's heartbeat is missing: LOST.  No setpoint is sent, so the firmware's own failsafe takes over;
+  only a landing that was ordered is still asked for, because a vehicle that is not heard may hear.  When the
+  heartbeat is back, a vehicle that was being set up is set up again from the start, for it may have
+  restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
+- Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
+- It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
+- It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
+- Its battery is low: an event; what to do about it is for the caller to say.
 """
 
-import math
 from array import array
+from collections.abc import Mapping
 from typing import Any
 
 from swarmctl.mavlink.codec import Frame
 from swarmctl.mavlink.dialect import mav
 
 from . import procedures
-from .autopilots.adapter import Adapter
-from .autopilots.registry import ADAPTERS, adapter_for, autopilot_name
-from .commands import Command
-from .events import Event, EventKind, TextAssembler
-from .link import AUTOPILOT_COMPONENT, GROUND_COMPONENT, GROUND_SYSTEM, Link
-from .phases import SET_UP, TABLE, Action, Phase, Signal
+from .events import Event, EventKind
+from .link import GROUND_COMPONENT, GROUND_SYSTEM
+from .machine import Machine
+from .phases import FLYING, SET_UP, TABLE, Phase, Signal
 from .reading import READERS, read_position
-from .settings import SessionSettings
-from .statistics import Statistics, spread
-from .steps import TIME_SLACK_S, Procedure, Step
-from .telemetry import Telemetry
+from .statistics import Statistics
+from .steps import TIME_SLACK_S
+from .watch import RESTART_MS
 
 GLOBAL_POSITION_INT: int = mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
 HEARTBEAT: int = mav.MAVLINK_MSG_ID_HEARTBEAT
+LANDED_STATE: int = mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 COMMAND_ACK: int = mav.MAVLINK_MSG_ID_COMMAND_ACK
 STATUSTEXT: int = mav.MAVLINK_MSG_ID_STATUSTEXT
 
@@ -45,34 +49,8 @@ class OrderError(Exception):
     """An order that the session's phase does not allow, or that makes no sense."""
 
 
-class Session:
+class Session(Machine):
     """The controller's side of one vehicle. ``telemetry`` and ``phase`` are there to be read at any time."""
-
-    def __init__(self, system: int, *, settings: SessionSettings, now: float) -> None:
-        self.system = system
-        self.phase = Phase.CONNECTING
-        self.reason = ""  #: why it FAILED or was RELEASED
-        self.telemetry = Telemetry()
-        self.adapter: Adapter | None = None
-        self.setpoint_intervals_s: array[float] = array("d")
-        self._settings = settings.on_clock()
-        self._now = now
-        self._link = Link(system)
-        self._events: list[Event] = []
-        self._texts = TextAssembler()
-        self._procedure: Procedure | None = None
-        self._phase_when_lost = Phase.CONNECTING
-        self._autopilot = 0
-        self._altitude_m = 0.0
-        self._heartbeat_due = now
-        self._hold_due = math.inf
-        self._heard_at = now
-        self._setpoint_at = math.nan
-        self._setpoints_sent = 0
-        self._setpoints_refused = 0
-        self._round_trips_s: array[float] = array("d")
-        self._actions = {action: getattr(self, f"_{action.value}") for action in Action}
-        self._schedule()
 
     # What the caller does
 
@@ -80,8 +58,12 @@ class Session:
         """Take in bytes from the link: any part of a frame, or many, of any vehicle."""
         self._now = now
         for frame in self._link.take(data):
+            self._heard_at = now
             if frame.message_id == GLOBAL_POSITION_INT:
+                booted_ms = self.telemetry.boot_ms
                 read_position(self.telemetry, frame.fields, now)
+                if self.telemetry.boot_ms < booted_ms - RESTART_MS:
+                    self._restarted()
             else:
                 self._read(frame)
         if self._procedure is not None:
@@ -93,7 +75,8 @@ class Session:
         if now + TIME_SLACK_S < self._wake:
             return
         if now + TIME_SLACK_S >= self._heartbeat_due:
-            self._send_heartbeat()
+            self._heartbeat_due = now + self._settings.heartbeat_period_s
+            self._link.send_heartbeat()
         if now + TIME_SLACK_S >= self._link_deadline():
             self._signal(Signal.LINK_LOST)
         if self._procedure is not None:
@@ -112,9 +95,52 @@ class Session:
         """Order: take control, so that setpoints are flown. Raises OrderError outside HOLDING."""
         self._order(Signal.ENGAGE)
 
+    def hold(self) -> None:
+        """Order: stop here, in the firmware's own hold; HOLDING when it does.  Raises OrderError.
+
+        Only while ENGAGING or ENGAGED.
+        """
+        self._require(Signal.HOLD)
+        self._altitude_m = self.telemetry.height_m
+        self._signal(Signal.HOLD)
+
+    def resume(self) -> None:
+        """Order: take control again after ``hold``.  Raises OrderError outside HOLDING."""
+        self.engage()
+
     def land(self) -> None:
-        """Order: land here and disarm. Raises OrderError where there is nothing to land."""
+        """Order: land here and disarm.  Raises OrderError where there is nothing to land.
+
+        A LOST vehicle that flew is told so too: it may hear although it is not heard.
+        """
+        if self.phase is Phase.LOST and self._phase_when_lost not in FLYING:
+            raise OrderError(
+                f"vehicle {self.system}: lost while {self._phase_when_lost.value}, not ours to land"
+            )
         self._order(Signal.LAND)
+
+    def release(self) -> None:
+        """Order: stop the vehicle in its own hold, then leave it to somebody else.  Raises OrderError.
+
+        A vehicle that is landing goes on with that.
+        """
+        self._require(Signal.RELEASE)
+        self._altitude_m = self.telemetry.height_m
+        self.reason = "released by order"
+        self._signal(Signal.RELEASE)
+
+    def retake(self) -> None:
+        """Order: take control of a RELEASED vehicle, at its present height.  Raises OrderError.
+
+        Refused for one that is not flying, or does not say where.
+        """
+        self._require(Signal.RETAKE)
+        if not self.telemetry.armed or self.telemetry.landed_state == procedures.ON_GROUND:
+            raise OrderError(f"vehicle {self.system}: cannot be retaken, it is not flying")
+        if self._now - self.telemetry.received_at > self._settings.position_loss_s:
+            raise OrderError(f"vehicle {self.system}: cannot be retaken, its position is not known")
+        self._altitude_m = self.telemetry.height_m
+        self._signal(Signal.RETAKE)
 
     def setpoint(self, v_east: float, v_north: float, altitude_m: float) -> bool:
         """Fly this velocity (m/s) at this height above home (m) until the next setpoint.
@@ -124,14 +150,23 @@ class Session:
         if self.phase is not Phase.ENGAGED:
             return False
         if not abs(v_east) + abs(v_north) + abs(altitude_m) <= PLAUSIBLE:
-            self._setpoints_refused += 1
+            self._tally.setpoints_refused += 1
             return False
-        if self._setpoints_sent:
-            self.setpoint_intervals_s.append(self._now - self._setpoint_at)
-        self._setpoint_at = self._now
-        self._setpoints_sent += 1
+        self._tally.setpoint(self._now)
         self._send_setpoint(v_east, v_north, altitude_m)
         return True
+
+    def _order(self, signal: Signal) -> None:
+        """Carry out an order, or refuse it."""
+        self._require(signal)
+        self._signal(signal)
+
+    def _require(self, signal: Signal) -> None:
+        """Raise OrderError if the table has no such order for this phase, or no adapter to carry it out."""
+        if (self.phase, signal) not in TABLE or self.adapter is None:
+            raise OrderError(
+                f"vehicle {self.system}: {signal.value} is not possible while {self.phase.value}"
+            )
 
     # What the caller gets
 
@@ -155,16 +190,25 @@ class Session:
 
     def statistics(self) -> Statistics:
         """The figures so far."""
-        return Statistics(
-            messages_received=self._link.received,
-            messages_lost=self._link.lost,
-            messages_bad=self._link.bad,
-            messages_late=self._link.late,
-            setpoints_sent=self._setpoints_sent,
-            setpoints_refused=self._setpoints_refused,
-            setpoint_interval=spread(self.setpoint_intervals_s),
-            command_round_trip=spread(self._round_trips_s),
-        )
+        return self._tally.figures(self._link)
+
+    @property
+    def setpoint_intervals_s(self) -> "array[float]":
+        """The caller's time between each two setpoints."""
+        return self._tally.setpoint_intervals_s
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """What the preflight read: ``speed_mps`` and so on, by the adapter's quantities."""
+        if self.adapter is None:
+            return {}
+        known = ((q.name, self._checks.parameters.get(q)) for q in self.adapter.quantities)
+        return {name: value for name, value in known if value is not None}
+
+    @property
+    def fence_verified(self) -> bool:
+        """Whether the vehicle holds the preflight's fence, vertex by vertex."""
+        return self._checks.transfer is not None and self._checks.transfer.verified
 
     # Messages
 
@@ -178,25 +222,63 @@ class Session:
             self.adapter.observe(frame.message_id, frame.fields, self.telemetry)
         if frame.message_id == HEARTBEAT:
             self._read_heartbeat(frame.fields, was_armed)
+        elif frame.message_id == LANDED_STATE:
+            if self.telemetry.landed_state == procedures.ON_GROUND:
+                self._signal(Signal.CAME_DOWN)
         elif frame.message_id == COMMAND_ACK:
             self._read_ack(frame.fields)
         elif frame.message_id == STATUSTEXT:
             self._read_text(frame.fields)
+        else:
+            self._read_exchange(frame)
+        if self._watch.battery_low(self.telemetry):
+            percent = self.telemetry.battery_percent
+            self._report(EventKind.BATTERY_LOW, f"vehicle {self.system}: {percent} % left")
+
+    def _read_exchange(self, frame: Frame) -> None:
+        """A parameter, or a part of the fence."""
+        adapter, procedure = self.adapter, self._procedure
+        known = adapter is not None and self._checks.take(frame, adapter.integers_bytewise)
+        if known and procedure is not None:
+            procedure.progressed(self._now)
 
     def _read_heartbeat(self, fields: Any, was_armed: bool) -> None:
         """The vehicle lives; is it still ours?"""
-        self._heard_at = self._now
+        self._beat_at = self._now
         self._autopilot = fields.autopilot
         if self.phase is Phase.LOST:
             set_up = self._phase_when_lost in SET_UP
             self._signal(Signal.LINK_BACK_IN_SET_UP if set_up else Signal.LINK_BACK_IN_FLIGHT)
         self._signal(Signal.HEARTBEAT)
-        if was_armed and not self.telemetry.armed:
+        if was_armed and not self.telemetry.armed and not self._is_down():
             self._signal(Signal.DISARMED)
         expected = self._expected_modes()
         if expected is not None and self.telemetry.armed and self.telemetry.mode not in expected:
             self._signal(Signal.MODE_TAKEN)
+        if self._watch.position_lost(self.telemetry, self._now):
+            self._position_lost()
         self._schedule()
+
+    def _is_down(self) -> bool:
+        """Whether disarming is what a landing ends with: not while it sinks, high above its home."""
+        t = self.telemetry
+        high = t.height_m > self._settings.disarm_height_m and t.v_up < -self._settings.climb_tolerance_mps
+        return self.phase is Phase.LANDING and not high
+
+    def _position_lost(self) -> None:
+        """Heartbeats, but no position."""
+        self._watch.streams_gone = True
+        if (self.phase, Signal.POSITION_LOST) in TABLE:
+            text = f"vehicle {self.system}: no valid position while {self.phase.value}"
+            self._report(EventKind.POSITION_LOST, text)
+            self._signal(Signal.POSITION_LOST)
+
+    def _restarted(self) -> None:
+        """Its clock runs from zero again."""
+        self._watch.streams_gone = True
+        text = f"vehicle {self.system}: its autopilot restarted while {self.phase.value}"
+        self._report(EventKind.RESTARTED, text)
+        self._signal(Signal.RESTARTED)
 
     def _expected_modes(self) -> frozenset[int] | None:
         """The modes that the vehicle may be in now if nobody interferes; None is any."""
@@ -223,165 +305,3 @@ class Session:
             self._report(EventKind.TEXT, text)
             if self._procedure is not None:
                 self._procedure.last_text = text
-
-    # The table at work
-
-    def _signal(self, signal: Signal) -> None:
-        """Walk the table: enter the next phase, then do its action."""
-        transition = TABLE.get((self.phase, signal))
-        if transition is None:
-            return
-        if transition.action is Action.SUSPEND:
-            self._phase_when_lost = self.phase
-        self._explain(signal)
-        self.phase = transition.phase or self._phase_when_lost
-        self._hold_due = self._now if self.phase is Phase.ENGAGING else math.inf
-        self._report(EventKind.PHASE, self.phase.value)
-        self._actions[transition.action]()
-        self._schedule()
-
-    def _explain(self, signal: Signal) -> None:
-        """Keep the reason of what is about to happen, told from the phase in which it does."""
-        if signal is Signal.DISARMED:
-            self.reason = f"it disarmed while {self.phase.value}"
-        elif signal is Signal.MODE_TAKEN and self.adapter is not None:
-            mode = self.adapter.modes.name(self.telemetry.mode)
-            self.reason = f"its mode became {mode} while {self.phase.value}"
-
-    def _order(self, signal: Signal) -> None:
-        """Carry out an order, or refuse it."""
-        self._require(signal)
-        self._signal(signal)
-
-    def _require(self, signal: Signal) -> None:
-        """Raise OrderError if the table has no such order for this phase, or no adapter to carry it out."""
-        if (self.phase, signal) not in TABLE or self.adapter is None:
-            raise OrderError(
-                f"vehicle {self.system}: {signal.value} is not possible while {self.phase.value}"
-            )
-
-    def _begin(self, steps: tuple[Step, ...]) -> None:
-        """Start a procedure in place of any other."""
-        self._procedure = Procedure(
-            steps, self._settings, self._now, self._send_command, self._round_trips_s.append
-        )
-        self._advance()
-
-    def _advance(self) -> None:
-        """Let the procedure do what is due, and pass on how it ended.
-
-        A hold setpoint that is due goes first: the stream must reach the vehicle before the mode change.
-        """
-        procedure = self._procedure
-        if procedure is None or self.phase is Phase.LOST:
-            return
-        if self._now + TIME_SLACK_S >= self._hold_due:
-            self._send_hold()
-        over = procedure.advance(self.telemetry, self._now)
-        for warning in procedure.warnings:
-            self._report(EventKind.WARNING, warning)
-        procedure.warnings.clear()
-        if over:
-            self._procedure = None
-            self.reason = procedure.failure or ""
-            self._signal(Signal.STEP_FAILED if procedure.failure else Signal.STEPS_DONE)
-        self._schedule()
-
-    # Actions, by the names that the table gives them
-
-    def _identify(self) -> None:
-        self.telemetry.forget()
-        self.adapter = adapter_for(self._autopilot)
-        if self.adapter is None:
-            known = ", ".join(autopilot_name(number) for number in ADAPTERS)
-            self.reason = f"its autopilot is {autopilot_name(self._autopilot)}; can fly: {known}"
-            self._signal(Signal.STEP_FAILED)
-        else:
-            self._begin(procedures.identifying(self._settings))
-
-    def _configure(self) -> None:
-        self._begin(procedures.configuring(self._known_adapter(), self._settings))
-
-    def _locate(self) -> None:
-        self._begin(procedures.positioning(self._settings))
-
-    def _take_off(self) -> None:
-        adapter = self._known_adapter()
-        self._begin(procedures.taking_off(adapter, self.telemetry, self._altitude_m, self._settings))
-
-    def _engage(self) -> None:
-        self._begin(procedures.engaging(self._known_adapter(), self._settings))
-
-    def _land(self) -> None:
-        self._begin(procedures.landing(self._known_adapter(), self.telemetry, self._settings))
-
-    def _rest(self) -> None:
-        """Nothing to do until the next order."""
-
-    def _fail(self) -> None:
-        self._procedure = None
-        self.reason = f"vehicle {self.system}: {self.reason}"
-        self._report(EventKind.FAILED, self.reason)
-
-    def _release(self) -> None:
-        self._procedure = None
-        self.reason = f"vehicle {self.system}: {self.reason}"
-        self._report(EventKind.RELEASED, self.reason)
-
-    def _suspend(self) -> None:
-        seconds = self._settings.link_loss_s * self._settings.time_scale
-        self._link.expect_any()
-        was = self._phase_when_lost.value
-        self._report(EventKind.LOST, f"vehicle {self.system}: no heartbeat for {seconds:g} s while {was}")
-
-    def _resume(self) -> None:
-        self._report(EventKind.REGAINED, f"vehicle {self.system}: heartbeat again")
-        if self._procedure is not None:
-            self._procedure.begin_step(self._now)
-
-    # Sending
-
-    def _known_adapter(self) -> Adapter:
-        """The adapter, which every phase after IDENTIFYING has."""
-        assert self.adapter is not None
-        return self.adapter
-
-    def _send_heartbeat(self) -> None:
-        self._heartbeat_due = self._now + self._settings.heartbeat_period_s
-        self._link.send(
-            self._link.encoder.heartbeat(
-                mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, mav.MAV_STATE_ACTIVE
-            )
-        )
-
-    def _send_command(self, command: Command, confirmation: int) -> None:
-        message = mav.MAVLink_command_long_message(
-            self.system, AUTOPILOT_COMPONENT, command.number, confirmation, *command.parameters
-        )
-        self._link.send(self._link.encoder.encode(message))
-
-    def _send_hold(self) -> None:
-        """Stand still at the take-off altitude: only while offboard mode is being entered."""
-        self._hold_due = self._now + 1.0 / (self._settings.setpoint_rate_hz * self._settings.time_scale)
-        self._send_setpoint(0.0, 0.0, self._altitude_m)
-
-    def _send_setpoint(self, v_east: float, v_north: float, altitude_m: float) -> None:
-        frame = self._known_adapter().setpoint(
-            self._link.encoder, self.system, self.telemetry, (v_east, v_north), altitude_m
-        )
-        self._link.send(frame)
-
-    # Time
-
-    def _link_deadline(self) -> float:
-        """When the link counts as lost, in the phases that can lose it."""
-        can_lose = (self.phase, Signal.LINK_LOST) in TABLE
-        return self._heard_at + self._settings.link_loss_s if can_lose else math.inf
-
-    def _schedule(self) -> None:
-        """Work out when ``poll`` is next needed."""
-        procedure = self._procedure.deadline if self._procedure and self.phase is not Phase.LOST else math.inf
-        self._wake = min(self._heartbeat_due, self._hold_due, self._link_deadline(), procedure)
-
-    def _report(self, kind: EventKind, text: str) -> None:
-        self._events.append(Event(self._now, self.system, kind, text))

@@ -21,14 +21,20 @@ class SessionSettings:
     setpoint_rate_hz: float = 10.0  #: hold setpoints while offboard mode is being entered
 
     heartbeat_period_s: float = 1.0  #: our own HEARTBEAT
-    link_loss_s: float = 3.0  #: without the vehicle's HEARTBEAT its link counts as lost
+    link_loss_s: float = 3.0  #: without HEARTBEAT; on the ground, of silence: the link counts as lost
     ack_timeout_s: float = 0.5  #: a command without COMMAND_ACK is sent again
     attempts: int = 12  #: unanswered sendings of one command until the session gives up
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again
     retry_pause_s: float = 1.0  #: before a temporarily rejected command is sent again
+    position_loss_s: float = 2.0  #: heartbeats without a valid position for so long: the position is lost
+    battery_low_percent: float | None = None  #: at or below it, the battery is reported as low; None: never
 
+    set_up_attempts: int = 6  #: set-ups broken off by a lost link or a restart until the session gives up
+    reminder_s: float = 10.0  #: while a vehicle gets ready, what tells so is asked for again this often
     ready_patience_s: float = 90.0  #: for each of position, home, origin and health before take-off
     command_patience_s: float = 20.0  #: for a command to be accepted and confirmed by telemetry
+    parameter_patience_s: float = 6.0  #: for each parameter; unknown ones may go without any answer
+    transfer_timeout_s: float = 5.0  #: a fence transfer that stands still for so long begins again
     climb_patience_s: float = 30.0  #: for take-off, besides the climb at ``slowest_climb_mps``
     slowest_climb_mps: float = 0.5
     landing_patience_s: float = 60.0  #: for the landing, besides the descent at ``slowest_descent_mps``
@@ -38,11 +44,12 @@ class SessionSettings:
 
     altitude_tolerance_m: float = 0.5  #: take-off is over within this of its altitude
     climb_tolerance_mps: float = 0.3  #: and slower than this
+    disarm_height_m: float = 3.0  #: above home; disarmed there while sinking, a landing has failed
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and value > 0):
+            if value is not None and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"session setting {field.name} must be positive and finite, not {value}")
 
     def on_clock(self) -> "SessionSettings":

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from .commands import ACCEPTED, IN_PROGRESS, TEMPORARILY_REJECTED, Command, result_name
+from .commands import ACCEPTED, IN_PROGRESS, TEMPORARILY_REJECTED, Ask, Command, result_name
 from .settings import SessionSettings
 from .telemetry import Telemetry
 
@@ -32,21 +32,25 @@ class OnFailure(Enum):
 class Step:
     """One thing to bring about.
 
-    ``command``: what is sent; None just waits.  ``confirmed``: what telemetry shows when it is done; None
-    believes the ACK, or without a command the passing of ``wait_s``.  ``wait_s``: how long the effect may
-    come by itself before the command is sent.  ``needs_ack``: telemetry alone is not enough, because it may
-    look the same from an earlier command.  ``insists``: any refusal is asked again until patience ends.
-    ``modes``: the modes in which the vehicle may show itself meanwhile; another one means that somebody else
-    changed it.
+    ``command``: what is sent, a COMMAND_LONG or other messages; None just waits.  ``confirmed``: what
+    telemetry shows when it is done; None believes the ACK, or without a command the passing of ``wait_s``.
+    ``wait_s``: how long the effect may come by itself before the command is sent.  ``needs_ack``: telemetry
+    alone is not enough, because it may look the same from an earlier command.  ``insists``: refused or
+    unanswered, it is asked again until patience ends.  ``answer_s``: how long an answer may take before it
+    is asked again, if not as long as any command's.  ``failed``: says why the effect cannot come any more,
+    or nothing.  ``modes``: the modes in which the vehicle may show itself meanwhile; another one means that
+    somebody else changed it.
     """
 
     name: str
     patience_s: float
-    command: Command | None = None
+    command: Ask | None = None
     confirmed: Condition | None = None
     wait_s: float = 0.0
     needs_ack: bool = False
     insists: bool = False
+    answer_s: float | None = None
+    failed: Callable[[], str] | None = None
     on_failure: OnFailure = OnFailure.FAIL
     modes: frozenset[int] | None = None
 
@@ -72,7 +76,7 @@ class Procedure:
         steps: Sequence[Step],
         settings: SessionSettings,
         now: float,
-        send: Callable[[Command, int], None],
+        send: Callable[[Ask, int], None],
         answered: Callable[[float], None],
     ) -> None:
         self.failure: str | None = None
@@ -109,7 +113,7 @@ class Procedure:
     def acknowledge(self, number: int, result: int, now: float) -> None:
         """Take in a COMMAND_ACK; one for a command that is not at work here is ignored."""
         step = self.step
-        if step is None or step.command is None or step.command.number != number:
+        if step is None or not isinstance(step.command, Command) or step.command.number != number:
             return
         if self._stage is Stage.WAITING:
             return
@@ -127,6 +131,14 @@ class Procedure:
         else:
             self._give_up(f"{step.command.name} was refused: {self._result}{self._quote()}", now)
 
+    def progressed(self, now: float) -> None:
+        """The vehicle takes part in the step's exchange: its time for an answer begins anew."""
+        step = self.step
+        exchange = step is not None and not isinstance(step.command, Command)
+        if step is not None and exchange and self._stage is Stage.ASKED:
+            self._sent = 1
+            self._due = now + (step.answer_s or self._settings.ack_timeout_s)
+
     def advance(self, telemetry: Telemetry, now: float) -> bool:
         """Do what is due; True when every step is done or one failed."""
         while self.failure is None:
@@ -136,6 +148,8 @@ class Procedure:
             if self._done(step, telemetry, now):
                 self._index += 1
                 self.begin_step(now)
+            elif step.failed is not None and step.failed():
+                self._give_up(f"{step.name}: {step.failed()}{self._quote()}", now)
             elif now + TIME_SLACK_S >= self._ends:
                 self._give_up(self._impatience(step), now)
             elif now + TIME_SLACK_S >= self._due:
@@ -156,16 +170,16 @@ class Procedure:
         """The time for the current stage is over: send the command, again if need be."""
         if step.command is None:
             self._due = math.inf
-        elif self._stage is Stage.ASKED and self._sent >= self._settings.attempts:
+        elif self._stage is Stage.ASKED and self._sent >= self._settings.attempts and not step.insists:
             tries = f"{self._sent} tries{self._quote()}"
             self._give_up(f"{step.command.name} was not answered in {tries}", now)
         else:
             if self._stage is not Stage.ASKED:
                 self._sent = 0
-            self._send(step.command, min(self._sent, 255))
+            self._send(step.command, self._sent)
             self._sent += 1
             self._asked_at = now
-            self._enter(Stage.ASKED, now + self._settings.ack_timeout_s)
+            self._enter(Stage.ASKED, now + (step.answer_s or self._settings.ack_timeout_s))
 
     def _enter(self, stage: Stage, due: float) -> None:
         self._stage = stage
@@ -184,8 +198,8 @@ class Procedure:
 
     def _impatience(self, step: Step) -> str:
         """What to say of a step that took too long."""
-        seconds = step.patience_s * self._settings.time_scale
-        if step.command is None:
+        seconds = round(step.patience_s * self._settings.time_scale, 1)
+        if not isinstance(step.command, Command):
             return f"{step.name}: not reached in {seconds:g} s{self._quote()}"
         last = f"; last answer {self._result}" if self._result else "; never answered"
         return f"{step.name}: {step.command.name} had no effect in {seconds:g} s{last}{self._quote()}"

@@ -1,6 +1,7 @@
 """A ground station of a few lines: raw frames to and from a stub fleet, in virtual time."""
 
 import math
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -18,8 +19,15 @@ Z_AND_VELOCITY = 1 | 2 | 32 | 64 | 128 | 256 | 2048
 class Station:
     """Drives a fleet tick by tick and remembers every frame of its first vehicle with the time it came."""
 
-    def __init__(self, pads: list[tuple[float, float]], limits: Limits, tick_s: float, hello: bool) -> None:
-        self.fleet = StubFleet(len(pads), origin=ORIGIN, pads_m=pads, limits=limits)
+    def __init__(
+        self,
+        pads: list[tuple[float, float]],
+        limits: Limits | None,
+        tick_s: float,
+        hello: bool,
+        **others: Any,
+    ) -> None:
+        self.fleet = StubFleet(len(pads), origin=ORIGIN, pads_m=pads, limits=limits, **others)
         self.vehicle = self.fleet.vehicles[0]
         self.encoder = Encoder(255, 190)
         self.decoder = Decoder()
@@ -29,7 +37,7 @@ class Station:
         self._ticks = 0
         self.fleet.advance(0.0)
         if hello:
-            self.send(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            self.beat()
         self.listen()
 
     def send(self, message: Any) -> None:
@@ -90,6 +98,19 @@ class Station:
     def arm(self) -> list[int]:
         return self.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
+    def beat(self) -> None:
+        """A ground station's heartbeat."""
+        self.send(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """As a client that knows the firmware's encoding would."""
+        before = len(self.all(22))
+        self.send(mav.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+        kind = self.all(22)[before][1].param_type
+        if kind == mav.MAV_PARAM_TYPE_INT32 and self.vehicle.personality.tells_parameter_errors:
+            (value,) = struct.unpack("<f", struct.pack("<i", value))
+        self.send(mav.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+
     def setpoint(
         self,
         v_north: float = 0.0,
@@ -133,6 +154,15 @@ class Station:
         self.run_until(lambda: self.mode == 0x3040000, 60.0)
         self.run(5.0)
 
+    def fly_guided(self, height: float) -> None:
+        """ArduPilot: wait for the position, arm in GUIDED, take off."""
+        self.run(42.0)
+        assert self.command(mav.MAV_CMD_DO_SET_MODE, 1, 4) == [0]
+        assert self.arm() == [0]
+        assert self.command(mav.MAV_CMD_NAV_TAKEOFF, *[math.nan] * 6, height) == [0]
+        self.run_until(lambda: self.body["up"] > height - 0.2, 60.0)
+        self.run(2.0)
+
     def fly_offboard(self, height: float) -> None:
         """Take off and switch to OFFBOARD, standing still."""
         self.fly_up(height)
@@ -149,7 +179,8 @@ def station() -> Callable[..., Station]:
         limits: Limits | None = None,
         tick_s: float = 0.1,
         hello: bool = True,
+        **others: Any,
     ) -> Station:
-        return Station(pads or [(0.0, 0.0)], limits or Limits(), tick_s, hello)
+        return Station(pads or [(0.0, 0.0)], limits, tick_s, hello, **others)
 
     return make

@@ -56,17 +56,41 @@ class Client:
         raise AssertionError(f"no message {message_id}")
 
 
+@contextlib.contextmanager
+def running(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """The command in a process of its own, which is ended in the end."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sim_vehicle_stub.cli", *arguments], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def line_with(process: subprocess.Popen[str], text: str) -> str:
+    """The next line that the command prints with this text in it."""
+    assert process.stderr is not None
+    return next(line for line in process.stderr if text in line)
+
+
+def heartbeat_of(decoder: Decoder, receive: Callable[[], bytes]) -> Any:
+    """The next HEARTBEAT that comes."""
+    for _ in range(100_000):
+        for frame in decoder.feed(receive()):
+            if frame.message_id == 0:
+                return frame
+    raise AssertionError("no heartbeat")
+
+
 @pytest.fixture
 def stub() -> Iterator[tuple[int, subprocess.Popen[str]]]:
     """Two vehicles in a process of their own."""
     port = free_base()
     arguments = ["--vehicles", "2", "--port", str(port), "--speed", "20", "--home", "47.0,8.0,100"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sim_vehicle_stub.cli", *arguments], stderr=subprocess.PIPE, text=True
-    )
-    yield port, process
-    process.kill()
-    process.communicate()
+    with running(*arguments) as process:
+        yield port, process
 
 
 def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subprocess.Popen[str]]) -> None:
@@ -106,7 +130,8 @@ def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subp
     ("arguments", "said"),
     [
         (["--vehicles", "0"], "--vehicles"),
-        (["--vehicles", "41"], "--vehicles"),
+        (["--vehicles", "41"], "--shared"),
+        (["--vehicles", "251"], "--vehicles"),
         (["--autopilot", "betaflight"], "--autopilot"),
         (["--speed", "0"], "--speed"),
         (["--speed", "nan"], "--speed"),
@@ -114,6 +139,13 @@ def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subp
         (["--home", "47,8"], "LAT,LON,ALT"),
         (["--home", "91,8,0"], "no place to fly"),
         (["--home", "nan,8,0"], "no place to fly"),
+        (["--vehicles", "3", "--autopilot", "px4,ardupilot"], "2 firmwares for 3"),
+        (["--wind", "3"], "EAST,NORTH"),
+        (["--wind", "nan,0"], "more than 100"),
+        (["--fault", "flood@3"], "no fault 'flood'"),
+        (["--fault", "2:reboot@3"], "no vehicle 2"),
+        (["--shared", "--pty"], "only one of"),
+        (["--tcp", "65530", "--vehicles", "2"], "no ports for 2"),
     ],
 )
 def test_a_wrong_command_line_says_so(arguments: list[str], said: str) -> None:
@@ -128,3 +160,82 @@ def test_a_port_that_is_taken_says_so() -> None:
         result = CliRunner().invoke(main, ["--port", str(port)])
     assert result.exit_code == 2
     assert f"cannot use the ports from {port + 40} on" in result.output
+
+
+def test_shared_all_send_to_one_port_and_are_answered_at_their_own() -> None:
+    """Rows "links": several vehicles on one socket, told apart by their system ids."""
+    port = free_base()
+    client = Client(port, port + 41)
+    arguments = ("--vehicles", "2", "--autopilot", "px4,ardupilot", "--port", str(port), "--shared")
+    with contextlib.closing(client.link), running(*arguments, "--speed", "10"):
+        heard = {}
+        while len(heard) < 2:
+            data, address = client.link.recvfrom(2048)
+            for frame in client.decoder.feed(data):
+                if frame.message_id == 0:
+                    heard[frame.system] = (address[1], frame.fields.autopilot)
+        assert heard == {1: (port + 40, 12), 2: (port + 41, 3)}
+        client.send(mav.MAVLink_command_long_message(2, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+        assert client.wait_for(77).system == 2
+
+
+def test_tcp_boots_with_the_first_client_and_has_one_at_a_time() -> None:
+    """Row "links": TCP 5760, spaced by ten, blocks until a client connects."""
+    port = free_base()
+    arguments = ("--vehicles", "2", "--autopilot", "ardupilot", "--tcp", str(port), "--speed", "10")
+    with running(*arguments) as process:
+        line_with(process, f"tcp ports from {port} on")
+        decoder = Decoder()
+        with connected(port + 10) as first:
+            assert heartbeat_of(decoder, lambda: first.recv(4096)).system == 2
+            ask = mav.MAVLink_command_long_message(2, 1, 512, 0, mav.MAVLINK_MSG_ID_VFR_HUD, 0, 0, 0, 0, 0, 0)
+            encoder = Encoder(255, 190)
+            for byte in encoder.encode(ask):
+                first.sendall(bytes([byte]))
+            while not any(f.message_id == 77 for f in decoder.feed(first.recv(4096))):
+                pass
+            with connected(port + 10) as second, contextlib.suppress(ConnectionResetError):
+                assert second.recv(10) == b""
+        with connected(port + 10) as third:
+            assert heartbeat_of(Decoder(), lambda: third.recv(4096)).system == 2
+
+
+def connected(port: int) -> socket.socket:
+    """A connection; the port may be opened a moment after it is announced."""
+    for _ in range(200_000):
+        with contextlib.suppress(ConnectionRefusedError):
+            return socket.create_connection(("127.0.0.1", port), TIMEOUT_S)
+    raise AssertionError(f"nobody listens on {port}")
+
+
+def test_a_pseudo_terminal_stands_for_a_serial_port() -> None:
+    with running("--pty", "--speed", "10") as process:
+        path = line_with(process, "vehicle 1:").split()[-1]
+        terminal = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        with os.fdopen(terminal, "r+b", buffering=0) as line:
+            decoder = Decoder()
+            assert heartbeat_of(decoder, lambda: line.read(4096)).system == 1
+            ask = mav.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0)
+            line.write(Encoder(255, 190).encode(ask))
+            while not any(f.message_id == 77 for f in decoder.feed(line.read(4096))):
+                pass
+
+
+def test_a_fault_happens_on_the_command_line_too() -> None:
+    port = free_base()
+    client = Client(port, port + 40)
+    with (
+        contextlib.closing(client.link),
+        running("--port", str(port), "--speed", "20", "--fault", "reboot@5", "--wind", "1,-2", "--seed", "4"),
+    ):
+        client.wait_for(30, lambda f: f.time_boot_ms > 4500)
+        client.wait_for(30, lambda f: f.time_boot_ms < 1000)
+        assert abs(client.wait_for(33).fields.alt - 488000) > 1
+
+
+def test_a_tcp_port_that_is_taken_says_so() -> None:
+    port = free_base()
+    with socket.create_server(("127.0.0.1", port)):
+        result = CliRunner().invoke(main, ["--tcp", str(port)])
+    assert result.exit_code == 2
+    assert f"cannot use the ports from {port} on" in result.output

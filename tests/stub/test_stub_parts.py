@@ -76,9 +76,9 @@ def test_without_power_a_body_falls_and_stands() -> None:
     truth = np.zeros(1, bodies.BODY)
     truth["up"] = 20.0
     arrays = (np.zeros(1, bodies.COMMAND), np.zeros(1, bodies.LIMITS))
-    bodies.move(truth, *arrays, 50, 0.02)
+    bodies.move(truth, *arrays, 0.0, 0.0, 50, 0.02)
     assert truth["up"][0] == pytest.approx(20.0 - 9.81 / 2, abs=0.2)
-    bodies.move(truth, *arrays, 100, 0.02)
+    bodies.move(truth, *arrays, 0.0, 0.0, 100, 0.02)
     assert tuple(truth[0]) == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -314,7 +314,7 @@ def test_the_battery_drains_in_the_air_alone(station: Make) -> None:
     before = s.last(1).battery_remaining
     s.run(20.0)
     assert before - s.last(1).battery_remaining == pytest.approx(20, abs=1)
-    assert station(limits=Limits(endurance_s=100.0)).vehicle.battery_percent == 100.0
+    assert station(limits=Limits(endurance_s=100.0)).vehicle.battery.percent == 100.0
 
 
 def test_the_same_flight_twice_gives_the_same_bytes(station: Make) -> None:

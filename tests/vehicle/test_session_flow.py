@@ -213,7 +213,7 @@ def test_px4_modes_and_commands() -> None:
     assert modes.name(0x7F0000) == "mode 0x7f0000"
 
 
-def test_px4_is_known_and_nothing_else_yet() -> None:
+def test_px4_is_known() -> None:
     adapter = adapter_for(mav.MAV_AUTOPILOT_PX4)
     assert adapter is not None and adapter.name == "px4"
     assert adapter is not adapter_for(mav.MAV_AUTOPILOT_PX4)

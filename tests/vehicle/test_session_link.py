@@ -230,6 +230,6 @@ def test_an_autopilot_that_we_cannot_fly_is_named(rig: Any) -> None:
     rig.vehicle.autopilot = mav.MAV_AUTOPILOT_PPZ
     rig.run(1.0)
     assert rig.session.phase is Phase.FAILED
-    assert rig.session.reason == "vehicle 1: its autopilot is PPZ; can fly: PX4"
+    assert rig.session.reason == "vehicle 1: its autopilot is PPZ; can fly: PX4, ARDUPILOTMEGA"
     with pytest.raises(OrderError, match="not possible while failed"):
         rig.session.land()

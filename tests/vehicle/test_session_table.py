@@ -9,11 +9,14 @@ from swarmctl.mavlink.dialect import mav
 from swarmctl.vehicle import phases
 from swarmctl.vehicle.autopilots.px4 import MODES
 from swarmctl.vehicle.events import EventKind
+from swarmctl.vehicle.fence import Fence
 from swarmctl.vehicle.phases import AIRBORNE, SET_UP, TABLE, Phase, Signal
+from swarmctl.vehicle.preflight import Preflight
 from swarmctl.vehicle.session import OrderError
 
 DENIED = [mav.MAV_RESULT_DENIED]
 POSCTL = 3 << 16
+PREFLIGHT = Preflight(fence=Fence([[(47.39, 8.54), (47.39, 8.55), (47.40, 8.55)]]))
 
 
 def hear(rig: Any) -> None:
@@ -30,8 +33,9 @@ def break_off(rig: Any) -> None:
     before = rig.session.phase
     if rig.session.phase is Phase.POSITIONING:
         rig.vehicle.healthy = False
+    rig.vehicle.memory.result = mav.MAV_MISSION_DENIED
     for number in (mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_NAV_TAKEOFF):
-        rig.vehicle.results[number] = [DENIED] * 20
+        rig.vehicle.results[number] = [DENIED] * 200
     rig.vehicle.out.clear()
     rig.until(lambda: rig.session.phase is not before)
 
@@ -47,8 +51,30 @@ def steal(rig: Any) -> None:
 
 def disarm(rig: Any) -> None:
     rig.until(lambda: rig.session.telemetry.armed)
+    if rig.session.phase is Phase.LANDING:
+        rig.run(2.0)
     rig.vehicle.armed = False
     rig.run(1.2)
+
+
+def blind(rig: Any) -> None:
+    rig.vehicle.fixed = False
+    rig.vehicle.deaf.add(mav.MAV_CMD_DO_SET_MODE)
+    rig.run(5.0)
+
+
+def come_down(rig: Any) -> None:
+    rig.vehicle.landed_state = mav.MAV_LANDED_STATE_ON_GROUND
+    rig.vehicle.deaf.add(mav.MAV_CMD_DO_SET_MODE)
+    rig.run(1.0)
+
+
+def restart(rig: Any) -> None:
+    """The vehicle's clock runs backwards."""
+    rig.vehicle.out.clear()
+    rig.vehicle.position(rig.now + 100.0)
+    rig.vehicle.position(rig.now)
+    rig.tick()
 
 
 def hush(rig: Any) -> None:
@@ -69,7 +95,13 @@ CAUSES: dict[Signal, Callable[[Any], None]] = {
     Signal.STEP_FAILED: break_off,
     Signal.TAKE_OFF: lambda rig: rig.session.take_off(20.0),
     Signal.ENGAGE: lambda rig: rig.session.engage(),
+    Signal.HOLD: lambda rig: rig.session.hold(),
     Signal.LAND: lambda rig: rig.session.land(),
+    Signal.RELEASE: lambda rig: rig.session.release(),
+    Signal.RETAKE: lambda rig: rig.session.retake(),
+    Signal.CAME_DOWN: come_down,
+    Signal.POSITION_LOST: blind,
+    Signal.RESTARTED: restart,
     Signal.MODE_TAKEN: steal,
     Signal.DISARMED: disarm,
     Signal.LINK_LOST: hush,
@@ -95,6 +127,15 @@ def prepare(rig: Any, phase: Phase, signal: Signal) -> None:
     elif phase is Phase.RELEASED:
         rig.reach(Phase.HOLDING)
         steal(rig)
+    elif phase is Phase.LOST and signal is Signal.STEPS_DONE:
+        rig.reach(Phase.LANDING)
+        rig.until(lambda: not rig.vehicle.armed)
+        rig.vehicle.deaf.add(mav.MAV_CMD_DO_SET_MODE)
+        rig.run(1.0)
+        hush(rig)
+    elif phase is Phase.LOST and signal is Signal.STEP_FAILED:
+        rig.reach(Phase.LANDING)
+        hush(rig)
     elif phase is Phase.LOST:
         rig.reach(Phase.READY if signal is Signal.LINK_BACK_IN_SET_UP else Phase.HOLDING)
         hush(rig)
@@ -104,7 +145,7 @@ def prepare(rig: Any, phase: Phase, signal: Signal) -> None:
 
 @pytest.mark.parametrize(("phase", "signal"), TABLE, ids=lambda value: value.name)
 def test_row(make_rig: Any, phase: Phase, signal: Signal) -> None:
-    rig = make_rig()
+    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None)
     prepare(rig, phase, signal)
     rig.events += rig.session.events()
     seen = len(entered(rig))
@@ -126,13 +167,16 @@ def test_every_phase_can_be_entered_and_every_action_is_used() -> None:
 
 @pytest.mark.parametrize("phase", [*SET_UP, Phase.CONNECTING, Phase.HOLDING, Phase.ENGAGED, Phase.LANDED])
 def test_an_order_out_of_place_is_refused_and_changes_nothing(make_rig: Any, phase: Phase) -> None:
-    rig = make_rig()
+    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None)
     rig.reach(Phase.LANDING if phase is Phase.LANDED else phase)
     rig.until_phase(phase)
     orders = {
         Signal.TAKE_OFF: lambda: rig.session.take_off(20.0),
         Signal.ENGAGE: rig.session.engage,
+        Signal.HOLD: rig.session.hold,
         Signal.LAND: rig.session.land,
+        Signal.RELEASE: rig.session.release,
+        Signal.RETAKE: rig.session.retake,
     }
     for signal, order in orders.items():
         if (phase, signal) not in TABLE:

@@ -68,3 +68,14 @@ def test_outgoing_and_traffic_are_given_out_once() -> None:
     link.take(incoming)
     assert link.outgoing() == [b"out"] and link.outgoing() == []
     assert link.traffic() == [b"out", incoming] and link.traffic() == []
+
+
+def test_late_news_is_outdated_only_by_its_own_kind() -> None:
+    """A heartbeat that a position overtook still tells the mode; one that a heartbeat overtook does not."""
+    encoder = Encoder(1, 1)
+    beats = [encoder.heartbeat(2, 12, 1, mode, 4) for mode in (10, 11)]
+    position = encoder.global_position_int(1, 2, 3, 4, 5, 6, 7, 8, 9)
+    for order, modes in (((0, 1), [10, 11]), ((1, 0), [11])):
+        link = Link(1)
+        passed_on = [frame for i in (position, *(beats[k] for k in order)) for frame in link.take(i)]
+        assert [f.fields.custom_mode for f in passed_on[1:]] == modes

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.vehicle.commands import Command
+from swarmctl.vehicle.parameters import Quantity
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.steps import Step
 from swarmctl.vehicle.telemetry import Telemetry
@@ -21,7 +22,7 @@ class Modes:
     """HEARTBEAT.custom_mode of the modes that the session uses, and names for those it may meet.
 
     ``take_off`` is what the vehicle shows while it climbs, ``engaged`` while it flies our setpoints,
-    ``comeback`` is the firmware's own return.
+    ``comeback`` is the firmware's own return, ``parked`` is left behind after landing: arming is harmless.
     """
 
     take_off: int
@@ -29,6 +30,7 @@ class Modes:
     engaged: int
     land: int
     comeback: int
+    parked: int
     names: Mapping[int, str]
 
     def name(self, mode: int) -> str:
@@ -38,17 +40,10 @@ class Modes:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How the vehicle brakes unless it says better, and the parameters that say it.
-
-    A quantity may have several names, newest first: firmwares rename their parameters.
-    """
+    """How the vehicle brakes from its speed to standstill, and how long it takes to begin."""
 
     braking_mps2: float
     latency_s: float
-    speed_parameters: tuple[str, ...]
-    acceleration_parameters: tuple[str, ...]
-    climb_parameters: tuple[str, ...]
-    descent_parameters: tuple[str, ...]
 
 
 class Adapter(Protocol):
@@ -64,7 +59,23 @@ class Adapter(Protocol):
 
     @property
     def limits(self) -> Limits:
-        """Its braking, and the parameters that bound its motion."""
+        """Its braking."""
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The parameters that bound its motion and say what its failsafes do."""
+
+    @property
+    def integers_bytewise(self) -> bool:
+        """Whether PARAM_VALUE carries an integer's bytes, or its number as a float."""
+
+    @property
+    def extra_rates(self) -> Mapping[int, float]:
+        """Message id → Hz of what ``observe`` needs, besides what every session asks for."""
+
+    @property
+    def needs_origin(self) -> bool:
+        """Whether setpoints are counted from the vehicle's own local origin."""
 
     @property
     def unwanted_messages(self) -> tuple[int, ...]:
@@ -72,6 +83,9 @@ class Adapter(Protocol):
 
     def set_mode(self, mode: int) -> Command:
         """The command that changes to one of ``modes``."""
+
+    def prepare(self, settings: SessionSettings) -> tuple[Step, ...]:
+        """The steps without which a vehicle that stands disarmed never says that it is ready to arm."""
 
     def take_off(
         self, telemetry: Telemetry, altitude_m: float, settings: SessionSettings
@@ -89,4 +103,4 @@ class Adapter(Protocol):
         """The frame that asks for an east-north velocity (m/s) at a height above home (m)."""
 
     def observe(self, message_id: int, fields: Any, telemetry: Telemetry) -> None:
-        """Take in any message; sets ``telemetry.healthy`` once the vehicle can be armed."""
+        """Take in any message, after ``telemetry`` has; sets ``telemetry.healthy`` once the vehicle can be armed."""

@@ -5,11 +5,21 @@ Velocity is flown with a z position, because a pure velocity setpoint drifts in 
 the vehicle's own local origin, so both origin and home must be known.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
-from swarmctl.vehicle.commands import CUSTOM_MODE_ENABLED, Command, arm, command, take_off
+from swarmctl.vehicle.commands import (
+    AUTOPILOT_COMPONENT,
+    CUSTOM_MODE_ENABLED,
+    Command,
+    arm,
+    command,
+    take_off,
+)
+from swarmctl.vehicle.parameters import Quantity
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.steps import Step
 from swarmctl.vehicle.telemetry import Telemetry
@@ -29,6 +39,7 @@ MODES = Modes(
     engaged=_mode(6),
     land=_mode(_AUTO, 6),
     comeback=_mode(_AUTO, 5),
+    parked=_mode(_AUTO, 3),
     names={
         _mode(1): "MANUAL",
         _mode(2): "ALTCTL",
@@ -46,13 +57,17 @@ MODES = Modes(
 )
 
 # 5 m/s commanded gave 3.0 m/s after a second, which is MPC_ACC_HOR's default; braking is no harder.
-LIMITS = Limits(
-    braking_mps2=3.0,
-    latency_s=0.5,
-    speed_parameters=("MPC_XY_VEL_MAX",),
-    acceleration_parameters=("MPC_ACC_HOR",),
-    climb_parameters=("MPC_Z_VEL_MAX_UP",),
-    descent_parameters=("MPC_Z_VEL_MAX_DN",),
+LIMITS = Limits(braking_mps2=3.0, latency_s=0.5)
+
+QUANTITIES: tuple[Quantity, ...] = (
+    Quantity("speed_mps", {"MPC_XY_VEL_MAX": 1.0}),
+    Quantity("acceleration_mps2", {"MPC_ACC_HOR": 1.0}),
+    Quantity("climb_mps", {"MPC_Z_VEL_MAX_UP": 1.0}),
+    Quantity("descent_mps", {"MPC_Z_VEL_MAX_DN": 1.0}),
+    Quantity("fence_action", {"GF_ACTION": 1.0}),
+    Quantity("setpoint_loss_s", {"COM_OF_LOSS_T": 1.0}),
+    Quantity("ground_station_loss_action", {"NAV_DLL_ACT": 1.0}),
+    Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
 
 # What the onboard link carries at 10 Hz and more without being asked, besides the position.
@@ -76,7 +91,6 @@ PREARM_CHECK: int = mav.MAV_SYS_STATUS_PREARM_CHECK
 LOCAL_NED: int = mav.MAV_FRAME_LOCAL_NED
 # Ignored: x, y, vz, the accelerations and the yaw rate. Flown: z, vx, vy and the yaw, 0, which is north.
 VELOCITY_AT_ALTITUDE = 1 | 2 | 32 | 64 | 128 | 256 | 2048
-AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 
 
 class Px4:
@@ -86,6 +100,14 @@ class Px4:
     modes = MODES
     limits = LIMITS
     unwanted_messages = UNWANTED_MESSAGES
+    quantities = QUANTITIES
+    integers_bytewise = True
+    extra_rates: Mapping[int, float] = MappingProxyType({})
+    needs_origin = True
+
+    def prepare(self, settings: SessionSettings) -> tuple[Step, ...]:
+        """Nothing: PX4 gets ready in any mode."""
+        return ()
 
     def set_mode(self, mode: int) -> Command:
         """DO_SET_MODE takes the main and the sub mode apart."""

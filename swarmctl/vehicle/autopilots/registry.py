@@ -5,9 +5,13 @@ from collections.abc import Callable, Mapping
 from swarmctl.mavlink.dialect import mav
 
 from .adapter import Adapter
+from .ardupilot import ArduPilot
 from .px4 import Px4
 
-ADAPTERS: Mapping[int, Callable[[], Adapter]] = {mav.MAV_AUTOPILOT_PX4: Px4}
+ADAPTERS: Mapping[int, Callable[[], Adapter]] = {
+    mav.MAV_AUTOPILOT_PX4: Px4,
+    mav.MAV_AUTOPILOT_ARDUPILOTMEGA: ArduPilot,
+}
 
 
 def adapter_for(autopilot: int) -> Adapter | None:

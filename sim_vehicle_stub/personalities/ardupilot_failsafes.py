@@ -1,0 +1,72 @@
+"""What makes ArduCopter leave the mode it is in: ground station, fence, position.  It never goes back."""
+
+from typing import TYPE_CHECKING
+
+from swarmctl.mavlink.dialect import mav
+
+from .ardupilot_commands import Mode
+
+if TYPE_CHECKING:
+    from .ardupilot import ArduPilot
+
+GCS_ACTIONS = {1: Mode.RTL, 3: Mode.SMART_RTL, 5: Mode.LAND}
+FENCE_ACTIONS = {1: Mode.RTL, 2: Mode.LAND, 3: Mode.SMART_RTL, 4: Mode.BRAKE}
+FENCE_SHAPES = 2 | 4
+"""The bits of FENCE_TYPE that stand for circles and polygons."""
+
+
+class Failsafes:
+    """The failsafes of one vehicle; each is noticed once, when it begins."""
+
+    def __init__(self, autopilot: "ArduPilot") -> None:
+        self._autopilot = autopilot
+        self._vehicle = autopilot.vehicle
+        self._values = autopilot.values
+        self.forget()
+
+    def forget(self) -> None:
+        """A new flight."""
+        self._gcs_lost = False
+        self._outside = False
+        self._unlocated = not self._vehicle.located
+
+    @property
+    def outside_fence(self) -> bool:
+        """Whether an enabled fence is broken where the vehicle is."""
+        vehicle, values = self._vehicle, self._values
+        if not vehicle.fence or not values["FENCE_ENABLE"] or not int(values["FENCE_TYPE"]) & FENCE_SHAPES:
+            return False
+        return vehicle.fence.broken_at(*vehicle.pilot.place[:2])
+
+    def watch(self) -> None:
+        """Notice what has begun since the last tick."""
+        if self._vehicle.landed:
+            return
+        self._watch_ground_station()
+        self._watch_fence()
+        self._watch_position()
+
+    def _watch_ground_station(self) -> None:
+        heard, was = self._vehicle.gcs_at, self._gcs_lost
+        silent = heard is not None and self._vehicle.now - heard > self._values["FS_GCS_TIMEOUT"]
+        self._gcs_lost = silent and self._values["FS_GCS_ENABLE"] > 0
+        if self._gcs_lost and not was:
+            self._say("GCS Failsafe")
+            self._autopilot.fail_into(GCS_ACTIONS.get(int(self._values["FS_GCS_ENABLE"]), Mode.RTL))
+
+    def _watch_fence(self) -> None:
+        was, self._outside = self._outside, self.outside_fence
+        if self._outside and not was:
+            self._say("Fence Breached")
+            action = FENCE_ACTIONS.get(int(self._values["FENCE_ACTION"]))
+            if action is not None:
+                self._autopilot.fail_into(action)
+
+    def _watch_position(self) -> None:
+        was, self._unlocated = self._unlocated, not self._vehicle.located
+        if self._unlocated and not was and self._values["FS_EKF_ACTION"]:
+            self._say("EKF Failsafe: changed to LAND Mode")
+            self._autopilot.fail_into(Mode.LAND)
+
+    def _say(self, text: str) -> None:
+        self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, text)

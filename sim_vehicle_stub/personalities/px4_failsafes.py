@@ -1,0 +1,120 @@
+"""What makes PX4 leave the mode it is in: fence, ground station, battery, position.
+
+Each is noticed once, when it begins.  Most make it loiter for a while first, so that a pilot can choose; a
+mode that is ordered ends the failsafe.  (The loss of setpoints is part of OFFBOARD itself.)
+"""
+
+import math
+from typing import TYPE_CHECKING
+
+from swarmctl.mavlink.dialect import mav
+
+from .px4_commands import Mode
+
+if TYPE_CHECKING:
+    from .px4 import Px4
+
+GCS_NOTICED_S = 1.8
+"""What passes, beside the parameter, until a silent ground station has consequences."""
+WARN = 1
+FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}
+GCS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}
+BATTERY_LEVELS = (
+    ("BAT_LOW_THR", "Low battery level, return advised"),
+    ("BAT_CRIT_THR", "Critical battery level, land now"),
+    ("BAT_EMERGEN_THR", "Emergency battery level, land immediately"),
+)
+BATTERY_ACTIONS = {2: (None, Mode.LAND, Mode.LAND), 3: (None, Mode.RTL, Mode.LAND)}
+"""By COM_LOW_BAT_ACT: what each level brings about; with other values nobody looks."""
+
+
+class Failsafes:
+    """The failsafes of one vehicle."""
+
+    def __init__(self, px4: "Px4") -> None:
+        self._px4 = px4
+        self._vehicle = px4.vehicle
+        self._parameters = px4.vehicle.parameters
+        self.forget()
+
+    def forget(self) -> None:
+        """A new flight: nothing has gone wrong yet, and a fence is broken only by leaving it."""
+        self._outside = self._breaks_fence()
+        self._gcs_lost = False
+        self._unlocated = False
+        self._level = 0
+        self.cancel()
+
+    def cancel(self) -> None:
+        """A mode was ordered: nothing is to follow."""
+        self._then: Mode | None = None
+        self._then_at = math.inf
+
+    @property
+    def misses_ground_station(self) -> bool:
+        """Whether a ground station is wanted and not heard."""
+        if self._parameters["NAV_DLL_ACT"] == 0:
+            return False
+        heard = self._vehicle.gcs_at
+        patience = self._parameters["COM_DL_LOSS_T"] + GCS_NOTICED_S
+        return heard is None or self._vehicle.now - heard > patience
+
+    def watch(self) -> None:
+        """Notice what has begun since the last tick."""
+        if self._vehicle.landed:
+            return
+        if self._vehicle.now >= self._then_at and self._then is not None:
+            mode, self._then = self._then, None
+            self._px4.fail_into(mode)
+        self._watch_fence()
+        self._watch_ground_station()
+        self._watch_battery()
+        self._watch_position()
+
+    def _breaks_fence(self) -> bool:
+        east, north = self._vehicle.pilot.place[:2]
+        return bool(self._vehicle.fence) and self._vehicle.fence.broken_at(east, north)
+
+    def _watch_fence(self) -> None:
+        was, self._outside = self._outside, self._breaks_fence()
+        action = self._parameters["GF_ACTION"]
+        if was or not self._outside or action == 0:
+            return
+        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence violated")
+        if action != WARN:
+            self._loiter_then(FENCE_ACTIONS.get(int(action), Mode.LOITER))
+
+    def _watch_ground_station(self) -> None:
+        was, self._gcs_lost = self._gcs_lost, self.misses_ground_station
+        if was or not self._gcs_lost:
+            return
+        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Connection to ground station lost")
+        self._loiter_then(GCS_ACTIONS.get(int(self._parameters["NAV_DLL_ACT"]), Mode.RTL))
+
+    def _watch_battery(self) -> None:
+        actions = BATTERY_ACTIONS.get(int(self._parameters["COM_LOW_BAT_ACT"]))
+        if actions is None:
+            return
+        share = self._vehicle.battery.percent / 100.0
+        while self._level < len(BATTERY_LEVELS) and share <= self._parameters[BATTERY_LEVELS[self._level][0]]:
+            text = BATTERY_LEVELS[self._level][1]
+            mode = actions[self._level]
+            self._level += 1
+            self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, text)
+            if mode is not None:
+                self.cancel()
+                self._px4.fail_into(mode)
+
+    def _watch_position(self) -> None:
+        """Without a position it can only descend, and drifts."""
+        was, self._unlocated = self._unlocated, not self._vehicle.located
+        if self._unlocated and not was:
+            self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Position estimate lost, blind descent")
+            self.cancel()
+            self._px4.fail_into(Mode.LAND)
+
+    def _loiter_then(self, mode: Mode) -> None:
+        """Loiter for COM_FAIL_ACT_T, then do what the failsafe is for."""
+        self._px4.fail_into(Mode.LOITER)
+        if mode is not Mode.LOITER:
+            self._then, self._then_at = mode, self._vehicle.now + self._parameters["COM_FAIL_ACT_T"]
