@@ -2,10 +2,14 @@
 
 import asyncio
 import contextlib
+from typing import TYPE_CHECKING
 
 import click
 
 from .faults import FAULTS, parse_order
+
+if TYPE_CHECKING:
+    from .links import Opener
 
 DEFAULT_PORT, OWN_PORT_OFFSET = 14540, 40
 AUTOPILOTS = ("px4", "ardupilot", "ardupilot-4.6")
@@ -152,14 +156,7 @@ def main(
             fleet.order(parse_order(fault))
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--fault") from None
-    own_port = port + OWN_PORT_OFFSET
-    if tcp is not None:
-        opener, where = links.tcp(tcp, TCP_SPACING), f"tcp ports from {tcp} on"
-    elif pty:
-        opener, where = links.pty(say_terminal), "pseudo-terminals"
-    else:
-        opener = links.udp(port, own_port, shared)
-        where = f"from udp port {own_port} on, to {port}{'' if shared else ' on'}"
+    opener, where, first = choose_links(port, shared, tcp, pty)
     click.echo(
         f"{vehicles} {', '.join(dict.fromkeys(autopilots))} vehicle(s): {where}; Ctrl-C ends.", err=True
     )
@@ -167,8 +164,20 @@ def main(
         with contextlib.suppress(KeyboardInterrupt):
             asyncio.run(links.serve(fleet, opener, speed))
     except OSError as error:
-        first = own_port if tcp is None else tcp
         raise click.UsageError(f"cannot use the ports from {first} on: {error.strerror}") from None
+
+
+def choose_links(port: int, shared: bool, tcp: int | None, pty: bool) -> tuple["Opener", str, int]:
+    """What opens the links, what to say of them, and the first port that they take."""
+    from . import links
+
+    if tcp is not None:
+        return links.tcp(tcp, TCP_SPACING), f"tcp ports from {tcp} on", tcp
+    if pty:
+        return links.pty(say_terminal), "pseudo-terminals", 0
+    own_port = port + OWN_PORT_OFFSET
+    where = f"from udp port {own_port} on, to {port}{'' if shared else ' on'}"
+    return links.udp(port, own_port, shared), where, own_port
 
 
 def check_links(vehicles: int, shared: bool, tcp: int | None, pty: bool) -> None:

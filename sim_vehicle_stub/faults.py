@@ -74,24 +74,21 @@ class FaultOrder(NamedTuple):
 
 
 class Faults:
-    """The faults of one vehicle."""
+    """The faults of one vehicle; ``active`` has the names of those that have begun and not ended."""
 
     def __init__(self, vehicle: "StubVehicle") -> None:
+        self.active: set[str] = set()
         self._vehicle = vehicle
-        self._active: set[str] = set()
-
-    def __contains__(self, name: str) -> bool:
-        return name in self._active
 
     def begin(self, name: str, value: float | None = None) -> None:
         """Begin a fault; raises KeyError for an unknown one."""
         kind = FAULTS[name]
-        self._active.add(name)
+        self.active.add(name)
         kind.begin(self._vehicle, (kind.value or 0.0) if value is None else value)
 
     def end(self, name: str) -> None:
         """End a fault; raises KeyError for an unknown one."""
-        self._active.discard(name)
+        self.active.discard(name)
         FAULTS[name].end(self._vehicle)
 
 

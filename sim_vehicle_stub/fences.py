@@ -91,9 +91,6 @@ class Fence:
         self._keep_in = [zone.shape for zone in zones if zone.inside]
         self._keep_out = [zone.shape for zone in zones if not zone.inside]
 
-    def __bool__(self) -> bool:
-        return bool(self._zones)
-
     def broken_at(self, east: float, north: float) -> bool:
         """Whether nobody may be here."""
         if any(shape.holds(east, north) for shape in self._keep_out):

@@ -51,21 +51,21 @@ class Upload:
 
 
 class Plans:
-    """The plans of one vehicle. ``kept`` has the items of each MAV_MISSION_TYPE."""
+    """The plans of one vehicle. ``kept`` has the items of each MAV_MISSION_TYPE, ``upload`` those to come."""
 
     def __init__(self, vehicle: "StubVehicle") -> None:
         self.kept: dict[int, list[Item]] = {MISSION: [], FENCE: [], RALLY: []}
+        self.upload: Upload | None = None
         self._vehicle = vehicle
-        self._upload: Upload | None = None
 
     def advance(self) -> None:
         """Ask again for an item that does not come, and give up in the end."""
-        upload = self._upload
+        upload = self.upload
         if upload is None or self._vehicle.now - upload.asked_at < ASK_AGAIN_S:
             return
         upload.attempts += 1
         if upload.attempts > ATTEMPTS:
-            self._upload = None
+            self.upload = None
             self._acknowledge(upload.client, upload.kind, mav.MAV_MISSION_OPERATION_CANCELLED)
         else:
             self._ask(upload)
@@ -84,8 +84,8 @@ class Plans:
             self._keep(fields.mission_type, [])
             self._acknowledge(client, fields.mission_type, ACCEPTED)
         else:
-            self._upload = Upload(frame, self._vehicle.now)
-            self._ask(self._upload)
+            self.upload = Upload(frame, self._vehicle.now)
+            self._ask(self.upload)
 
     def item_int(self, frame: Frame) -> None:
         """MISSION_ITEM_INT."""
@@ -131,7 +131,7 @@ class Plans:
 
     def _take(self, frame: Frame, item: Item) -> None:
         """An item has come: ask for the next, or check and keep them all."""
-        upload, fields = self._upload, frame.fields
+        upload, fields = self.upload, frame.fields
         client = (frame.system, frame.component)
         if upload is None or upload.client != client or upload.kind != fields.mission_type:
             if self.kept.get(fields.mission_type, [])[fields.seq :] == [item]:
@@ -143,7 +143,7 @@ class Plans:
         if len(upload.items) < upload.count:
             self._ask(upload)
             return
-        self._upload = None
+        self.upload = None
         fault = first_fault(upload.kind, upload.items)
         if fault == ACCEPTED:
             self._keep(upload.kind, upload.items)

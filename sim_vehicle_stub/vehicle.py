@@ -80,7 +80,7 @@ class StubVehicle:
         self.network: Network = Network(f"{surroundings.seed} {system}")
         self.faults = Faults(self)
         self.plans = Plans(self)
-        self.fence = Fence([])
+        self.fence: Fence | None = None
         self._start_error_m = surroundings.start_error_m
         self._kind = kind
         self._any_component = kind.answers_any_component
@@ -192,7 +192,8 @@ class StubVehicle:
         if not self.located or self.home is None:
             self._settle()
         self._feel_ground(elapsed)
-        self.plans.advance()
+        if self.plans.upload is not None:
+            self.plans.advance()
         self.personality.step()
         for message_id in self._streams.take_due(self._now_us):
             self.send(message_id)
@@ -325,7 +326,7 @@ class StubVehicle:
         """Start anew, motors off and deaf for a while: streams, mode, home and sequence numbers are gone."""
         self.pilot.power(False)
         self._boot(self.now + REBOOT_TAKES_S)
-        if "gps-loss" in self.faults:
+        if "gps-loss" in self.faults.active:
             self.lose_fix()
 
     def start(self, now: float) -> None:
@@ -334,8 +335,8 @@ class StubVehicle:
         self._boot(now)
 
     def build_fence(self, items: list[Item]) -> None:
-        """Hold the fence that these items describe."""
-        self.fence = fence_of(items, self.fleet_origin)
+        """Hold the fence that these items describe, or none."""
+        self.fence = fence_of(items, self.fleet_origin) if items else None
 
     def lose_fix(self) -> None:
         """No satellite is seen any more."""

@@ -251,7 +251,7 @@ class ArduPilot:
     def _heeds_setpoints(self) -> bool:
         """Whether a setpoint is flown.  None lifts off; but any ends a take-off where it is, silently."""
         vehicle = self.vehicle
-        if self.mode is not Mode.GUIDED or not vehicle.armed or "ignored-setpoints" in vehicle.faults:
+        if self.mode is not Mode.GUIDED or not vehicle.armed or "ignored-setpoints" in vehicle.faults.active:
             return False
         self._takeoff_height = self._lift_off_at = None
         if vehicle.landed:
@@ -271,7 +271,7 @@ class ArduPilot:
         if reason is not None:
             self.vehicle.say(mav.MAV_SEVERITY_WARNING, f"Mode change to {mode.name} failed: {reason}")
             return FAILED
-        if "stuck-mode" not in self.vehicle.faults:
+        if "stuck-mode" not in self.vehicle.faults.active:
             self._failsafe = False
             self._enter(mode)
         return ACCEPTED
@@ -311,7 +311,7 @@ class ArduPilot:
         vehicle, row = self.vehicle, MODES[self.mode]
         if vehicle.since_boot < CHECKED_AFTER_S:
             return "AHRS not healthy"
-        if "arming-refused" in vehicle.faults:
+        if "arming-refused" in vehicle.faults.active:
             return "Compass not calibrated"
         if not row.arms:
             return f"{self.mode.name} mode not armable"

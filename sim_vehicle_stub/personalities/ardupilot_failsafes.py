@@ -34,7 +34,9 @@ class Failsafes:
     def outside_fence(self) -> bool:
         """Whether an enabled fence is broken where the vehicle is."""
         vehicle, values = self._vehicle, self._values
-        if not vehicle.fence or not values["FENCE_ENABLE"] or not int(values["FENCE_TYPE"]) & FENCE_SHAPES:
+        if vehicle.fence is None or not values["FENCE_ENABLE"]:
+            return False
+        if not int(values["FENCE_TYPE"]) & FENCE_SHAPES:
             return False
         return vehicle.fence.broken_at(*vehicle.pilot.place[:2])
 
@@ -48,8 +50,9 @@ class Failsafes:
 
     def _watch_ground_station(self) -> None:
         heard, was = self._vehicle.gcs_at, self._gcs_lost
-        silent = heard is not None and self._vehicle.now - heard > self._values["FS_GCS_TIMEOUT"]
-        self._gcs_lost = silent and self._values["FS_GCS_ENABLE"] > 0
+        if heard is None or not self._values["FS_GCS_ENABLE"]:
+            return
+        self._gcs_lost = self._vehicle.now - heard > self._values["FS_GCS_TIMEOUT"]
         if self._gcs_lost and not was:
             self._say("GCS Failsafe")
             self._autopilot.fail_into(GCS_ACTIONS.get(int(self._values["FS_GCS_ENABLE"]), Mode.RTL))

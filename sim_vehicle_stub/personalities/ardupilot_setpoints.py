@@ -119,7 +119,7 @@ class Setpoints:
     def _throttled(self, v_east: float, v_north: float) -> tuple[float, float]:
         """The velocity that can still stop short of the fence: its part towards the nearest border."""
         vehicle, values = self._vehicle, self._values
-        if not vehicle.fence or not values["FENCE_ENABLE"] or not values["AVOID_ENABLE"]:
+        if vehicle.fence is None or not values["FENCE_ENABLE"] or not values["AVOID_ENABLE"]:
             return v_east, v_north
         east, north = vehicle.pilot.place[:2]
         border_east, border_north = vehicle.fence.nearest(east, north)

@@ -155,7 +155,7 @@ class Px4:
             self.vehicle.since_boot >= READY_AFTER_S
             and (self.mode is not Mode.OFFBOARD or self._setpoints.streaming)
             and self.vehicle.located
-            and "arming-refused" not in self.vehicle.faults
+            and "arming-refused" not in self.vehicle.faults.active
             and not self._failsafes.misses_ground_station
         )
 
@@ -281,7 +281,7 @@ class Px4:
             self._follow()
 
     def _follow(self) -> None:
-        if not self.vehicle.armed or "ignored-setpoints" in self.vehicle.faults:
+        if not self.vehicle.armed or "ignored-setpoints" in self.vehicle.faults.active:
             return
         if self.mode is Mode.OFFBOARD:
             self._setpoints.fly_last()
@@ -307,7 +307,7 @@ class Px4:
                 mav.MAV_SEVERITY_CRITICAL, "Switching to mode 'Offboard' is currently not possible"
             )
             return TEMPORARILY_REJECTED
-        if "stuck-mode" not in self.vehicle.faults:
+        if "stuck-mode" not in self.vehicle.faults.active:
             self._end_failsafe()
             self._enter(mode)
         return ACCEPTED
@@ -337,6 +337,7 @@ class Px4:
         """Limits take effect at once."""
         for limit in BOUND_LIMITS.get(name, ()):
             self._pilot.limit(limit, self._parameters[name])
+        self._failsafes.parameter_changed()
         self._pace()
 
     def disarmed(self) -> None:

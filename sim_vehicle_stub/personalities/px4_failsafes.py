@@ -24,7 +24,10 @@ BATTERY_LEVELS = (
     ("BAT_CRIT_THR", "Critical battery level, land now"),
     ("BAT_EMERGEN_THR", "Emergency battery level, land immediately"),
 )
-BATTERY_ACTIONS = {2: (None, Mode.LAND, Mode.LAND), 3: (None, Mode.RTL, Mode.LAND)}
+BATTERY_ACTIONS: dict[int, tuple[Mode | None, ...]] = {
+    2: (None, Mode.LAND, Mode.LAND),
+    3: (None, Mode.RTL, Mode.LAND),
+}
 """By COM_LOW_BAT_ACT: what each level brings about; with other values nobody looks."""
 
 
@@ -35,7 +38,14 @@ class Failsafes:
         self._px4 = px4
         self._vehicle = px4.vehicle
         self._parameters = px4.vehicle.parameters
+        self.parameter_changed()
         self.forget()
+
+    def parameter_changed(self) -> None:
+        """Read the parameters that every tick depends on."""
+        self._fence_action = int(self._parameters["GF_ACTION"])
+        self._gcs_action = int(self._parameters["NAV_DLL_ACT"])
+        self._battery_actions = BATTERY_ACTIONS.get(int(self._parameters["COM_LOW_BAT_ACT"]))
 
     def forget(self) -> None:
         """A new flight: nothing has gone wrong yet, and a fence is broken only by leaving it."""
@@ -53,7 +63,7 @@ class Failsafes:
     @property
     def misses_ground_station(self) -> bool:
         """Whether a ground station is wanted and not heard."""
-        if self._parameters["NAV_DLL_ACT"] == 0:
+        if self._gcs_action == 0:
             return False
         heard = self._vehicle.gcs_at
         patience = self._parameters["COM_DL_LOSS_T"] + GCS_NOTICED_S
@@ -61,40 +71,41 @@ class Failsafes:
 
     def watch(self) -> None:
         """Notice what has begun since the last tick."""
-        if self._vehicle.landed:
+        vehicle = self._vehicle
+        if vehicle.landed:
             return
-        if self._vehicle.now >= self._then_at and self._then is not None:
+        if self._then is not None and vehicle.now >= self._then_at:
             mode, self._then = self._then, None
             self._px4.fail_into(mode)
-        self._watch_fence()
-        self._watch_ground_station()
-        self._watch_battery()
-        self._watch_position()
+        if vehicle.fence is not None:
+            self._watch_fence()
+        if self._gcs_action:
+            self._watch_ground_station()
+        if self._battery_actions is not None:
+            self._watch_battery(self._battery_actions)
+        if vehicle.located is self._unlocated:
+            self._watch_position()
 
     def _breaks_fence(self) -> bool:
         east, north = self._vehicle.pilot.place[:2]
-        return bool(self._vehicle.fence) and self._vehicle.fence.broken_at(east, north)
+        return self._vehicle.fence is not None and self._vehicle.fence.broken_at(east, north)
 
     def _watch_fence(self) -> None:
         was, self._outside = self._outside, self._breaks_fence()
-        action = self._parameters["GF_ACTION"]
-        if was or not self._outside or action == 0:
+        if was or not self._outside or self._fence_action == 0:
             return
         self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence violated")
-        if action != WARN:
-            self._loiter_then(FENCE_ACTIONS.get(int(action), Mode.LOITER))
+        if self._fence_action != WARN:
+            self._loiter_then(FENCE_ACTIONS.get(self._fence_action, Mode.LOITER))
 
     def _watch_ground_station(self) -> None:
         was, self._gcs_lost = self._gcs_lost, self.misses_ground_station
         if was or not self._gcs_lost:
             return
         self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Connection to ground station lost")
-        self._loiter_then(GCS_ACTIONS.get(int(self._parameters["NAV_DLL_ACT"]), Mode.RTL))
+        self._loiter_then(GCS_ACTIONS.get(self._gcs_action, Mode.RTL))
 
-    def _watch_battery(self) -> None:
-        actions = BATTERY_ACTIONS.get(int(self._parameters["COM_LOW_BAT_ACT"]))
-        if actions is None:
-            return
+    def _watch_battery(self, actions: tuple[Mode | None, ...]) -> None:
         share = self._vehicle.battery.percent / 100.0
         while self._level < len(BATTERY_LEVELS) and share <= self._parameters[BATTERY_LEVELS[self._level][0]]:
             text = BATTERY_LEVELS[self._level][1]
@@ -107,8 +118,8 @@ class Failsafes:
 
     def _watch_position(self) -> None:
         """Without a position it can only descend, and drifts."""
-        was, self._unlocated = self._unlocated, not self._vehicle.located
-        if self._unlocated and not was:
+        self._unlocated = not self._vehicle.located
+        if self._unlocated:
             self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Position estimate lost, blind descent")
             self.cancel()
             self._px4.fail_into(Mode.LAND)

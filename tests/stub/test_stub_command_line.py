@@ -200,6 +200,25 @@ def test_tcp_boots_with_the_first_client_and_has_one_at_a_time() -> None:
             assert heartbeat_of(Decoder(), lambda: third.recv(4096)).system == 2
 
 
+def test_a_vehicle_boots_when_its_own_client_comes() -> None:
+    port = free_base()
+
+    def boot_s(decoder: Decoder, link: socket.socket) -> float:
+        while True:
+            for frame in decoder.feed(link.recv(4096)):
+                if frame.message_id == 30:
+                    return float(frame.fields.time_boot_ms) / 1000.0
+
+    with running("--vehicles", "2", "--tcp", str(port), "--speed", "50") as process:
+        line_with(process, "tcp ports")
+        with connected(port) as first:
+            decoder = Decoder()
+            while boot_s(decoder, first) < 30.0:
+                pass
+            with connected(port + 10) as second:
+                assert boot_s(Decoder(), second) < 15.0
+
+
 def connected(port: int) -> socket.socket:
     """A connection; the port may be opened a moment after it is announced."""
     for _ in range(200_000):
