@@ -17,20 +17,23 @@ from swarmctl.core.arrays import Records
 from swarmctl.core.state import VEHICLE
 
 from .configured import configured_fleet
-from .links import serve
+from .links import serve, udp
 
 STEP_S = 0.02
 OWN_PORT_OFFSET = 1000
 
 
 def order(
-    vehicles: Records, origin: Sequence[float], endurance_s: Sequence[float | None], port: int, speed: float
-) -> str:
+    vehicles: Records, origin: Sequence[float], endurance_s: Sequence[float | None], autopilots: Sequence[str],
+    wind_mps: Sequence[float], port: int, speed: float,
+) -> str:  # fmt: skip
     """The order for ``vehicles`` (V,) VEHICLE, vehicle i sending to ``port`` + i of this machine."""
     content = {
         "vehicles": [dict(zip(VEHICLE.names or (), row.tolist(), strict=True)) for row in vehicles],
         "origin": list(origin),
         "endurance_s": list(endurance_s),
+        "autopilots": list(autopilots),
+        "wind_mps": list(wind_mps),
         "port": port,
         "speed": speed,
     }
@@ -43,9 +46,12 @@ async def _run(wanted: dict[str, Any]) -> None:
         for name, value in values.items():
             row[name] = value
     lat, lon, alt = wanted["origin"]
-    fleet = configured_fleet(vehicles, (lat, lon, alt), wanted["endurance_s"], STEP_S)
+    fleet = configured_fleet(
+        vehicles, (lat, lon, alt), wanted["endurance_s"], STEP_S,
+        autopilots=wanted["autopilots"], wind_mps=tuple(wanted["wind_mps"]),
+    )  # fmt: skip
     serving = asyncio.ensure_future(
-        serve(fleet, wanted["port"], wanted["port"] + OWN_PORT_OFFSET, wanted["speed"])
+        serve(fleet, udp(wanted["port"], wanted["port"] + OWN_PORT_OFFSET, False), wanted["speed"])
     )
     ending = asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     done, _ = await asyncio.wait((serving, ending), return_when=asyncio.FIRST_COMPLETED)

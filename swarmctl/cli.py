@@ -286,14 +286,10 @@ def _refuse_what_stubs_cannot(mission: "Mission") -> None:
         complaints.append(
             f"safety.fence_margin_m: a flight needs {LEAST_MARGIN_M:g} m for the guard (raise it)"
         )
-    if any(mission.stub.wind_mps):
-        complaints.append("stub.wind_mps: the stub has no wind yet (set it to [0, 0])")
-    if mission.stub.autopilot != "px4" or any(v.autopilot == "ardupilot" for v in mission.fleet):
-        complaints.append("stub.autopilot: the stub plays px4 so far (set it to px4)")
     if len(mission.fleet) > MOST_SYSTEMS:
         complaints.append(f"vehicles: MAVLink tells {MOST_SYSTEMS} vehicles apart (fly fewer, or study more)")
     if any(v.connect for v in mission.fleet):
-        complaints.append("vehicles.connect: real vehicles cannot be flown yet (leave the key out)")
+        complaints.append("vehicles.connect: give --connect URL on the command line instead")
     if mission.launch == "as_found":
         complaints += _stub_pads(mission)
     if complaints:
@@ -329,11 +325,19 @@ def _make_stubs(mission: "Mission", world: "World") -> "Vehicles":
     """Stub vehicles that fly as the mission says, standing on its pads."""
     from sim_vehicle_stub.configured import configured_fleet
 
-    from .flight.fly import endurance_s
+    from .flight.fly import autopilots, endurance_s
 
     endurance = endurance_s(mission)
     origin = (mission.origin.lat, mission.origin.lon, mission.origin.alt_m)
-    return configured_fleet(world.fleet, origin, endurance, 1.0 / mission.setpoints.rate_hz)
+    interval = 1.0 / mission.setpoints.rate_hz
+    return configured_fleet(
+        world.fleet,
+        origin,
+        endurance,
+        interval,
+        autopilots=autopilots(mission),
+        wind_mps=mission.stub.wind_mps,
+    )
 
 
 @contextmanager

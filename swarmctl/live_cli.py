@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import click
 
-from .flight.fly import Orders, Report, endurance_s
+from .flight.fly import Orders, Report, autopilots, endurance_s
 from .flight.fly_live import LiveOptions, fly_live
 from .flight.results import Outcome
 from .mission.model import Mission
@@ -68,7 +68,10 @@ def stub_process(mission: Mission, seed: int, speed: float) -> Iterator[int]:
     process = subprocess.Popen(command, stdin=subprocess.PIPE, text=True, start_new_session=True)
     try:
         assert process.stdin is not None
-        process.stdin.write(order(world.fleet, origin, endurance, port, speed) + "\n")
+        process.stdin.write(
+            order(world.fleet, origin, endurance, autopilots(mission), mission.stub.wind_mps, port, speed)
+            + "\n"
+        )
         process.stdin.flush()
         yield port
     finally:

@@ -56,6 +56,11 @@ def endurance_s(mission: Mission) -> list[float]:
     return [v.endurance_s or 2.0 * (mission.duration_s + STUB_RESERVE_S) for v in mission.fleet]
 
 
+def autopilots(mission: Mission) -> list[str]:
+    """Which firmware each stub vehicle plays."""
+    return [mission.stub.autopilot if v.autopilot == "auto" else v.autopilot for v in mission.fleet]
+
+
 def warm_up(mission: Mission, algorithm: str) -> bool:
     """Compile, or load, every kernel a flight calls; returns whether they had to be compiled."""
     first_time = not bind.is_compiled(algorithm)
@@ -109,7 +114,14 @@ def session_settings(mission: Mission) -> SessionSettings:
 def about_flight(mission: Mission, world: World, seed: int) -> dict[str, str]:
     """What a recording says of itself."""
     endurance = " ".join(f"{s:g}" for s in endurance_s(mission))
-    return {"algorithm": world.algorithm, "seed": str(seed), "version": __version__, "endurance_s": endurance}
+    return {
+        "algorithm": world.algorithm,
+        "seed": str(seed),
+        "version": __version__,
+        "endurance_s": endurance,
+        "autopilots": " ".join(autopilots(mission)),
+        "wind_mps": " ".join(f"{w:g}" for w in mission.stub.wind_mps),
+    }
 
 
 def obey_and_report(swarm: Swarm, world: World, orders: Orders, report: Report) -> Callable[[float], None]:

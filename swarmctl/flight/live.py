@@ -14,14 +14,14 @@ from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
 from swarmctl.vehicle.addresses import Address
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
-from swarmctl.vehicle.phases import Phase
+from swarmctl.vehicle.phases import FLYING, Phase
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.switchboard import Switchboard
 from swarmctl.vehicle.transports import TransportError
 
 from .journal import Journal
-from .swarm import FLYING, GONE, Part, RefusedError, Swarm
+from .swarm import GONE, Part, RefusedError, Swarm
 from .track import Track
 
 SETTLE_S = 1.0

@@ -16,7 +16,7 @@ from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
 from swarmctl.vehicle.events import Event, EventKind
-from swarmctl.vehicle.phases import Phase
+from swarmctl.vehicle.phases import FLYING, Phase
 from swarmctl.vehicle.session import OrderError, Session
 
 from .journal import Journal
@@ -33,8 +33,9 @@ STAGE_OF = {
     Phase.ENGAGING: stages.HOLD,
     Phase.LANDING: stages.LAND,
     Phase.LANDED: stages.LANDED,
+    Phase.STOPPING: stages.HOLD,
+    Phase.RELEASING: stages.HOLD,
 }
-FLYING = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGING, Phase.ENGAGED, Phase.LANDING)
 GONE = (Phase.FAILED, Phase.RELEASED, Phase.LOST)
 QUIET = (EventKind.PHASE, EventKind.TEXT)
 

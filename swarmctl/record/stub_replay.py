@@ -6,7 +6,7 @@ say how far the stub's motion is from theirs.
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -38,7 +38,14 @@ class Vehicles(Protocol):
         """Move all of them on."""
 
 
-MakeVehicles = Callable[[Records, tuple[float, float, float], Sequence[float | None], float], Vehicles]
+class MakeVehicles(Protocol):
+    """Makes fresh vehicles as a recording's were."""
+
+    def __call__(
+        self, vehicles: Records, origin: tuple[float, float, float], endurance_s: Sequence[float | None],
+        interval_s: float, *, autopilots: Sequence[str], wind_mps: tuple[float, float],
+    ) -> Vehicles:  # fmt: skip
+        """On the pads of ``vehicles`` about ``origin``."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +85,12 @@ def replay_stub(folder: RunFolder, make_vehicles: MakeVehicles) -> Compared:
     endurance = [float(s) for s in log.metadata["flight"].get("endurance_s", "").split()]
     if len(endurance) != len(world.fleet):
         raise LogError(f"{folder.mcap}: does not say how long its vehicles can fly")
+    flown = log.metadata["flight"]
+    east, north = (float(part) for part in flown.get("wind_mps", "0 0").split())
+    place = (origin["lat"], origin["lon"], origin["alt_m"])
+    autopilots = flown.get("autopilots", "px4").split()
     vehicles = make_vehicles(
-        world.fleet, (origin["lat"], origin["lon"], origin["alt_m"]), endurance, interval
+        world.fleet, place, endurance, interval, autopilots=autopilots, wind_mps=(east, north)
     )
     orders: dict[int, list[Frame]] = defaultdict(list)
     recorded: dict[tuple[int, int], tuple[int, ...]] = {}
