@@ -138,7 +138,7 @@ def test_bad_command_lines(
     ("line", "words"),
     [
         ("dynamics: ideal", ("dynamics", "fly flies multicopters", "leave the key out")),
-        ("stub: {wind_mps: [3, 0]}", ("stub.wind_mps", "no wind yet")),
+        ("safety: {fence_margin_m: 0}", ("safety.fence_margin_m", "needs 2 m", "raise it")),
     ],
 )
 def test_what_fly_cannot_fly_is_refused(
