@@ -88,10 +88,17 @@ class Flight:
             self.check()
         return self
 
-    def check(self, slack: float = 0.05) -> None:
-        """Everybody in the guard's fence, and apart; ``slack`` (m) for the bend of a turn within an interval."""
+    @property
+    def bend(self) -> float:
+        """How far (m) a turn bends off the straight leg that the guard tests: a T²/8 over its time T, which is the
+        latency, what rounding it up to whole intervals adds, and the coming interval."""
+        time_s = self.latency + 2.0 * float(self.world.rules[0]["interval"])
+        return 0.01 + float(self.world.fleet["acceleration"].max()) * time_s * time_s / 8.0
+
+    def check(self) -> None:
+        """Everybody in the guard's fence, but for the bend of a turn, and apart."""
         places = self.places
-        room = self.kept.buffer(slack, join_style="mitre")
+        room = self.kept.buffer(self.bend, join_style="mitre")
         outside = places[~shapely.intersects_xy(room, places)]
         assert not len(outside), f"outside the fence at tick {self.tick}: {outside}"
         assert self.nearest() >= float(self.world.rules[0]["separation"]), f"too near at tick {self.tick}"
