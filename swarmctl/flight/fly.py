@@ -162,7 +162,12 @@ def picture(outcome: Outcome) -> Picture:
     count = max(len(found_s), 1)
     east, north = outcome.track.field("east"), outcome.track.field("north")
     airborne = outcome.track.airborne
-    tracks = [np.column_stack((east[:, i], north[:, i]))[airborne[:, i]] for i in range(east.shape[1])]
+    began = outcome.swarm.search_began
+    searching = outcome.track.times_s < (np.inf if began is None else began + outcome.searched_s)
+    places = np.stack((east, north), axis=2)
+    vehicles = range(east.shape[1])
+    tracks = [places[airborne[:, i] & searching, i] for i in vehicles]
+    returns = [places[airborne[:, i] & ~searching, i] for i in vehicles]
     times = np.concatenate(([0.0], ordered, [outcome.searched_s]))
     fraction = np.concatenate(([0.0], np.arange(1, len(ordered) + 1) / count, [len(ordered) / count]))
     return Picture(
@@ -177,6 +182,7 @@ def picture(outcome: Outcome) -> Picture:
         crossings=outcome.summary("")["time_to_s"],
         duration_s=max(outcome.searched_s, 1.0),
         subtitle=f"{outcome.mission.name}, seed {outcome.seed}",
+        returns=returns,
     )
 
 

@@ -25,6 +25,7 @@ def redraw(folder: RunFolder) -> Path:
     targets = world.scene.targets
     found = np.full(len(targets), np.inf)
     places: list[list[tuple[float, float]]] = [[] for _ in world.fleet]
+    homeward: list[list[tuple[float, float]]] = [[] for _ in world.fleet]
     ticks = 0
     for message in log.rows("/observations", "/ticks"):
         if message.topic == "/observations":
@@ -35,7 +36,8 @@ def redraw(folder: RunFolder) -> Path:
             continue
         for i, row in enumerate(as_now(message.rows, rows.TICK, "/ticks")):
             if stages.TAKE_OFF <= row["stage"] <= stages.LAND:
-                places[i].append((row["east"], row["north"]))
+                part = places if row["stage"] <= stages.SEARCH else homeward
+                part[i].append((row["east"], row["north"]))
     ordered = np.sort(found[np.isfinite(found)])
     count = max(len(targets), 1)
     assert state.TARGET.names
@@ -50,6 +52,7 @@ def redraw(folder: RunFolder) -> Path:
         fraction=np.concatenate(([0.0], np.arange(1, len(ordered) + 1), [len(ordered)])) / count,
         crossings=time_to(found),
         duration_s=max(ticks * period, 1.0),
+        returns=[np.array(p).reshape(-1, 2) for p in homeward],
         subtitle=f"{mission.name}, seed {int(world.rules[0]['seed'])}",
     )
     draw(folder.tracks, picture)

@@ -58,6 +58,7 @@ class Picture:
     crossings: Mapping[str, float | None]
     duration_s: float
     subtitle: str = ""
+    returns: Sequence[Floats] = ()  #: ways home, (n, 2) each; ``tracks`` then end where the search did
 
 
 def draw(path: Path, picture: Picture) -> None:
@@ -118,6 +119,10 @@ def _draw_tracks(chart: Axes, picture: Picture) -> None:
     """Every track, thinner where there are many, with its launch and its end."""
     many = len(picture.tracks) > 12
     width, size = (0.6, 4.5) if many else (1.0, 7.0)
+    for vehicle, way in enumerate(picture.returns):
+        if len(way):
+            home: Style = {"linestyle": (0, (5, 4)), "linewidth": 0.8 * width, "alpha": 0.45}
+            chart.plot(*_thinned(way).T, **home, color=_colour(vehicle), zorder=2.5)
     for vehicle, track in enumerate(picture.tracks):
         if len(track) == 0:
             continue
@@ -248,8 +253,13 @@ def _draw_legend(figure: Figure, picture: Picture) -> None:
     square: Style = {"linestyle": "none", "marker": "s", "markersize": 8, "markerfacecolor": "white"}
     handles: list[Line2D | Patch] = [
         Line2D([], [], linestyle="none", marker="^", markersize=7, color=GREY, label="launch"),
-        Line2D([], [], **square, markeredgecolor=GREY, label="end"),
+        Line2D(
+            [], [], **square, markeredgecolor=GREY, label="end of the search" if picture.returns else "end"
+        ),
+        Line2D([], [], **dot | {"markersize": 11}, color=GREY, label="vehicle's number"),
     ]
+    if picture.returns:
+        handles.append(Line2D([], [], linestyle=(0, (5, 4)), linewidth=0.9, color=GREY, label="way home"))
     if len(picture.targets):
         missed = len(picture.targets) - found
         handles.append(Line2D([], [], **dot, color=INK, label=f"found: {found}"))
