@@ -5,65 +5,35 @@ place that knows both the controller and the stub.
 """
 
 import json
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from . import __version__
+from .console import (
+    BAD_INPUT,
+    DIFFERS,
+    interruptible,
+    plain_errors,
+    print_algorithms,
+    print_summary,
+    progress,
+    say,
+)
 from .core.planners import MODULES
 
 if TYPE_CHECKING:
     from .core.world import World
-    from .flight.fly import Orders, Report
     from .flight.lockstep import Vehicles
     from .mission.model import Mission
 
-BAD_INPUT, FAILED, REFUSED, ABORTED, DIFFERS = 2, 1, 3, 4, 5
 LEAST_MARGIN_M = 2.0
 MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
 FASTEST = 100.0
 PathArgument = click.Path(path_type=Path)
-
-
-def say(text: str) -> None:
-    """Progress and errors go to stderr; results alone to stdout."""
-    click.echo(text, err=True)
-
-
-@contextmanager
-def plain_errors() -> Iterator[None]:
-    """Turn what bad input raises into a message and an exit code; nobody sees a traceback for it."""
-    from .flight.fly import StoppedError
-    from .flight.swarm import FlightError, RefusedError
-    from .mission.errors import MissionError
-    from .record.errors import RecordError
-    from .vehicle.addresses import AddressError
-
-    try:
-        yield
-    except (MissionError, RecordError, AddressError) as error:
-        say(str(error))
-        sys.exit(BAD_INPUT)
-    except StoppedError as error:
-        say(str(error))
-        sys.exit(ABORTED)
-    except RefusedError as error:
-        say(f"refused: {error}")
-        sys.exit(REFUSED)
-    except FlightError as error:
-        say(f"the flight failed: {error}")
-        sys.exit(FAILED)
-    except OSError as error:
-        say(f"cannot write: {error.strerror or error}")
-        with suppress(OSError):
-            sys.stdout.close()  # or the interpreter would try again to write what is left
-        sys.exit(BAD_INPUT)
 
 
 class SpeedType(click.ParamType):  # type: ignore[type-arg]
@@ -148,11 +118,11 @@ def fly(
         folder = flight.default_folder(out, name)
         orders = flight.Orders()
         ending.callback(folder.remove_if_empty)
-        with _interruptible(orders):
+        with interruptible(orders):
             _warm_up(mission, name)
             what = "vehicles" if urls else "stub vehicles"
             say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
-            report = _progress(mission)
+            report = progress(mission)
             if urls:
                 outcome = live_cli.fly_connected(
                     mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, report
@@ -165,7 +135,7 @@ def fly(
         if as_json:
             click.echo(json.dumps(summary, indent=2, allow_nan=False))
         else:
-            _print_summary(summary)
+            print_summary(summary)
         for line in outcome.complaints():
             say(line)
         sys.exit(outcome.exit_code())
@@ -235,24 +205,7 @@ def check(mission_file: Path | None) -> None:
 def algos(as_json: bool) -> None:
     """What can be flown, with its parameters, their defaults and where they come from."""
     with plain_errors():
-        _print_algorithms(as_json)
-
-
-def _print_algorithms(as_json: bool) -> None:
-    from .core import planners
-
-    table = {name: planners.module(name) for name in MODULES}
-    if as_json:
-        rows = {
-            name: {"title": m.TITLE, "parameters": [p._asdict() for p in m.PARAMETERS]}
-            for name, m in table.items()
-        }
-        click.echo(json.dumps(rows, indent=2, ensure_ascii=False))
-        return
-    for name, module in table.items():
-        click.echo(f"{name}: {module.TITLE}")
-        for p in module.PARAMETERS:
-            click.echo(f"    {p.name:<18}{p.default:>8g}  {p.meaning}  [{p.source}]")
+        print_algorithms(as_json)
 
 
 @main.command()
@@ -338,70 +291,6 @@ def _make_stubs(mission: "Mission", world: "World") -> "Vehicles":
         autopilots=autopilots(mission),
         wind_mps=mission.stub.wind_mps,
     )
-
-
-@contextmanager
-def _interruptible(orders: "Orders") -> Iterator[None]:
-    """Ctrl-C (or SIGTERM) once: all return; twice: all land; a third time: stop at once."""
-
-    def obey(number: int, frame: FrameType | None) -> None:
-        orders.interrupt()
-        words = (
-            "",
-            "returning; press Ctrl-C again to land now",
-            "landing now; again to stop at once",
-            "stopping",
-        )
-        say(words[min(orders.level, 3)])
-
-    before: dict[int, Any] = {n: signal.signal(n, obey) for n in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _progress(mission: "Mission") -> "Report":
-    """A line for each part of the flight; on a terminal, one that moves."""
-    from .flight.swarm import Swarm
-
-    shown: list[str] = [""]
-    moving = sys.stderr.isatty()
-
-    def report(now: float, swarm: Swarm, world: "World") -> None:
-        share = float((world.found >= 0).mean()) if len(world.found) else 0.0
-        line = f"{now:7.0f} s  {swarm.part.value:<12} found {100 * share:5.1f} %"
-        if moving:
-            click.echo(f"\r{line}", err=True, nl=False)
-            if swarm.part.value == "over":
-                say("")
-        elif swarm.part.value != shown[0]:
-            say(line)
-        shown[0] = swarm.part.value
-
-    return report
-
-
-def _print_summary(summary: dict[str, Any]) -> None:
-    """The figures a person looks for first."""
-    reached = ", ".join(
-        f"{k} % at {v:.0f} s" if v is not None else f"{k} % never" for k, v in summary["time_to_s"].items()
-    )
-    close = summary["min_separation_m"]
-    landed = sum(v["outcome"] == "landed" for v in summary["per_vehicle"])
-    lines = (
-        f"{summary['algorithm']}: {summary['detected']} of {summary['targets']} targets found; {reached}",
-        f"{landed} of {summary['vehicles']} vehicles landed; closest approach "
-        + ("none" if close is None else f"{close:.1f} m")
-        + f"; {summary['geofence_violations']} fence violations",
-        f"{summary['wall_s']:.1f} s of wall time, {summary['real_time_factor']:.0f} x real time",
-        f"run: {summary['run']}",
-    )
-    click.echo("\n".join(lines))
-    for vehicle in summary["per_vehicle"]:
-        for event in vehicle["events"]:
-            click.echo(f"  vehicle {vehicle['id']}: {event}")
 
 
 def _replay_stub(folder: Any, as_json: bool) -> None:
