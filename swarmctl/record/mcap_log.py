@@ -4,7 +4,7 @@ MCAP is a container of messages on named topics; each topic carries the schema o
 explains itself.  A topic of records holds one message a tick: the tick's number, its time and an array of
 NumPy records, stored as they lie in memory, which is also how ROS 1 would write them (ros1.py).  Viewers such
 as Foxglove open the file as it is; mcap_read.py reads it back.  Messages are collected into compressed
-chunks; a chunk that was written survives a crash, so the flight calls :meth:`McapLog.flush` once a second.
+chunks; a chunk that was written survives a crash, so the flight calls :meth:`McapLog.flush` now and then.
 """
 
 import json
