@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from swarmctl.mavlink.codec import Encoder
-from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.dialect import CURRENT_MODE, mav
 from swarmctl.vehicle.commands import (
     AUTOPILOT_COMPONENT,
     CUSTOM_MODE_ENABLED,
@@ -70,7 +70,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
 
-# What the onboard link carries at 10 Hz and more without being asked, besides the position.
+# What the onboard link carries often, or at every change of mode, without being asked.
 UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_ATTITUDE,
     mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -85,6 +85,8 @@ UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_HIGHRES_IMU,
     mav.MAVLINK_MSG_ID_ALTITUDE,
     mav.MAVLINK_MSG_ID_ODOMETRY,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT,
+    CURRENT_MODE,
 )
 
 PREARM_CHECK: int = mav.MAV_SYS_STATUS_PREARM_CHECK
