@@ -108,8 +108,21 @@ class Px4:
     needs_origin = True
 
     def prepare(self, settings: SessionSettings) -> tuple[Step, ...]:
-        """Nothing: PX4 gets ready in any mode."""
-        return ()
+        """Out of OFFBOARD, but never of a vehicle that somebody has armed.
+
+        PX4 falls back to it after a flight; without setpoints it then never says that it is ready.
+        """
+        patience = settings.ready_patience_s
+        return (
+            Step("standing disarmed", patience, confirmed=lambda t: not t.armed),
+            Step(
+                "loiter mode",
+                patience,
+                command=self.set_mode(MODES.parked),
+                confirmed=lambda t: t.mode != MODES.engaged,
+                insists=True,
+            ),
+        )
 
     def set_mode(self, mode: int) -> Command:
         """DO_SET_MODE takes the main and the sub mode apart."""
