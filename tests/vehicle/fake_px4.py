@@ -78,6 +78,8 @@ class FakePx4:
             fields = frame.fields
             if frame.message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
                 self.ground_heartbeats += 1
+            elif frame.message_id == mav.MAVLINK_MSG_ID_TIMESYNC:
+                continue
             elif fields.target_system != self.system:
                 continue
             elif frame.message_id == mav.MAVLINK_MSG_ID_COMMAND_LONG:

@@ -12,6 +12,7 @@ from swarmctl.vehicle.events import EventKind
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
+from swarmctl.vehicle.statistics import Tally
 
 ORIGIN = (47.3977, 8.5456, 488.0)
 TICK_S = 0.1
@@ -114,6 +115,31 @@ def test_in_flight_only_what_is_read_crosses_the_link() -> None:
     interval = session.statistics().setpoint_interval
     assert interval is not None and interval.maximum_s == pytest.approx(0.1)
     assert session.statistics().setpoints_sent == 600
+
+
+def test_the_links_round_trip_is_measured_once_a_second() -> None:
+    flight = Flight()
+    flight.engage()
+    session = flight.sessions[0]
+    pings = session.statistics()
+    flight.run(60.0)
+    after = session.statistics()
+    assert pings.round_trip is not None and after.round_trip is not None
+    assert after.round_trip.maximum_s <= 0.2
+    assert after.round_trip.minimum_s >= 0.0
+
+
+def test_a_pong_for_another_is_ignored() -> None:
+    tally = Tally()
+    tally.ping(1.0)
+    tally.ping(2.0)
+    pong = mav.MAVLink_timesync_message
+    for other in (pong(5, 77), pong(0, 1_000_000_000), pong(5, 0)):
+        tally.pong(other, 3.0)
+    assert list(tally.pings_s) == []
+    for _ in range(2):
+        tally.pong(pong(5, 1_000_000_000), 3.5)
+    assert list(tally.pings_s) == [2.5]
 
 
 def test_six_vehicles_each_by_itself() -> None:
