@@ -203,6 +203,16 @@ class Session(Machine):
         return self._tally.figures(self._link)
 
     @property
+    def loss(self) -> float:
+        """The share of this vehicle's messages that got lost on the way, so far."""
+        return self._link.lost / max(self._link.lost + self._link.received, 1)
+
+    @property
+    def round_trip_s(self) -> float | None:
+        """The link's last round trip; None before the first."""
+        return self._tally.pings_s[-1] if self._tally.pings_s else None
+
+    @property
     def setpoint_intervals_s(self) -> "array[float]":
         """The caller's time between each two setpoints."""
         return self._tally.setpoint_intervals_s
