@@ -16,11 +16,11 @@ from . import __version__
 from .console import (
     BAD_INPUT,
     DIFFERS,
+    REFUSED,
     interruptible,
     plain_errors,
     print_algorithms,
     print_summary,
-    progress,
     say,
 )
 from .core.planners import MODULES
@@ -67,6 +67,21 @@ mission_option = click.option(
     "--mission", "mission_file", type=PathArgument, help="Mission file (default: the packaged paper.yaml)."
 )
 
+connect_option = click.option(
+    "--connect",
+    "urls",
+    multiple=True,
+    metavar="URL",
+    help="The vehicles there, e.g. udpin://0.0.0.0:14540-14545; may be given again.",
+)
+timeout_option = click.option(
+    "--connect-timeout",
+    type=click.FloatRange(0.1),
+    default=20.0,
+    show_default=True,
+    help="Seconds to wait for them.",
+)
+
 
 @main.command()
 @mission_option
@@ -82,55 +97,53 @@ mission_option = click.option(
     metavar="max|FACTOR",
     help="max: lockstep, as fast as it goes (default without --connect); a factor: live, so many times real time.",
 )
+@connect_option
+@timeout_option
 @click.option(
-    "--connect",
-    "urls",
-    multiple=True,
-    metavar="URL",
-    help="Fly the vehicles there, e.g. udpin://0.0.0.0:14540-14545.",
-)
-@click.option(
-    "--connect-timeout",
-    type=click.FloatRange(0.1),
-    default=20.0,
-    show_default=True,
-    help="Seconds to wait for them.",
+    "--autopilot",
+    type=click.Choice(["auto", "px4", "ardupilot"]),
+    help="What stub vehicles play, and vehicles by --connect must be (auto: whatever they are).",
 )
 @click.option("--out", type=PathArgument, help="The run's folder (default: runs/DATE-TIME-ALGO).")
 @click.option("--json", "as_json", is_flag=True, help="Print summary.json, and nothing else, on stdout.")
 @click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
 def fly(
     mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
-    speed: float | None, urls: tuple[str, ...], connect_timeout: float, out: Path | None, as_json: bool, yes: bool,
+    speed: float | None, urls: tuple[str, ...], connect_timeout: float, autopilot: str | None, out: Path | None,
+    as_json: bool, yes: bool,
 ) -> None:  # fmt: skip
     """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
     with plain_errors(), ExitStack() as ending:
         from . import live_cli
+        from .dashboard import Progress
         from .flight import fly as flight
+        from .flight.orders import Orders
         from .mission.launch import as_found
 
-        mission = _load(mission_file, algorithm, vehicles, duration)
-        if urls:
+        mission = _load(mission_file, algorithm, vehicles, duration, autopilot)
+        real = live_cli.connects(mission, urls)
+        if real:
             mission = as_found(mission)
         else:
             _refuse_what_stubs_cannot(mission)
         name = mission.planner.algorithm
         folder = flight.default_folder(out, name)
-        orders = flight.Orders()
+        orders = Orders()
         ending.callback(folder.remove_if_empty)
-        with interruptible(orders):
+        progress = Progress()
+        with interruptible(orders, progress.say, real):
             _warm_up(mission, name)
-            what = "vehicles" if urls else "stub vehicles"
+            what = "vehicles" if real else "stub vehicles"
             say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
-            report = progress(mission)
-            if urls:
-                outcome = live_cli.fly_connected(
-                    mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, report
-                )
-            elif speed is not None:
-                outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, report)
-            else:
-                outcome = flight.fly(mission, seed, folder, _make_stubs, orders, report)
+            with progress.shown():
+                if real:
+                    outcome = live_cli.fly_connected(
+                        mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, progress
+                    )
+                elif speed is not None:
+                    outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, progress)
+                else:
+                    outcome = flight.fly(mission, seed, folder, _make_stubs, orders, progress.flying)
             summary = flight.write_results(outcome, folder)
         if as_json:
             click.echo(json.dumps(summary, indent=2, allow_nan=False))
@@ -171,13 +184,21 @@ def replay(run: Path, algorithm: str | None, stub: bool, as_json: bool) -> None:
 
 @main.command()
 @click.argument("run", type=PathArgument)
-@click.argument("order", type=click.Choice(["hold", "resume", "return", "land"]))
-def control(run: Path, order: str) -> None:
-    """Speak to the live flight that records into RUN."""
-    from .flight.control import ControlError, send
+@click.argument("order", type=click.Choice(["hold", "resume", "return", "land", "release", "retake"]))
+@click.argument("vehicle", metavar="[ID]", type=click.IntRange(1), required=False)
+def control(run: Path, order: str, vehicle: int | None) -> None:
+    """Speak to the live flight that records into RUN.
 
+    hold, resume, return and land are for everybody; release ID leaves one vehicle to somebody else, and retake
+    ID takes back one that was released or taken over.
+    """
+    from .flight.control import ControlError, send
+    from .flight.orders import OF_ONE
+
+    if (order in OF_ONE) != (vehicle is not None):
+        raise click.UsageError(f"{order} {'needs the ID of a vehicle' if order in OF_ONE else 'takes no ID'}")
     try:
-        click.echo(send(run, [order]))
+        click.echo(send(run, [order] if vehicle is None else [order, str(vehicle)]))
     except ControlError as error:
         say(str(error))
         sys.exit(BAD_INPUT)
@@ -185,12 +206,22 @@ def control(run: Path, order: str) -> None:
 
 @main.command()
 @mission_option
-def check(mission_file: Path | None) -> None:
-    """Validate a mission and say what it is; arm nothing."""
+@click.option("--vehicles", type=click.IntRange(1), help="How many vehicles.")
+@connect_option
+@timeout_option
+def check(
+    mission_file: Path | None, vehicles: int | None, urls: tuple[str, ...], connect_timeout: float
+) -> None:
+    """Validate a mission and say what it is; with --connect, probe its vehicles too.  Arms nothing.
+
+    A vehicle that stands where the mission expects it is given the mission's geofence, which is read back.
+    """
     with plain_errors():
-        mission = _load(mission_file, None, None, None)
+        from . import live_cli
+        from .mission.launch import as_found
         from .mission.scenario import Scenario
 
+        mission = _load(mission_file, vehicles=vehicles)
         scenario = Scenario(mission, ideal=False)
         targets = len(scenario.scene(1).targets)
         click.echo(
@@ -198,6 +229,19 @@ def check(mission_file: Path | None) -> None:
             f"{scenario.regions.legal.area / 1e6:.3f} km² to search inside the margin, "
             f"{len(mission.keep_out)} keep-outs, {targets} targets, {mission.duration_s:g} s"
         )
+        if live_cli.connects(mission, urls):
+            sys.exit(0 if _probe(as_found(mission), urls, connect_timeout) else REFUSED)
+
+
+def _probe(mission: "Mission", urls: tuple[str, ...], timeout_s: float) -> bool:
+    """Probe the vehicles; whether all may be armed."""
+    from . import live_cli
+    from .dashboard import Progress
+    from .flight.orders import Orders
+
+    orders, progress = Orders(), Progress()
+    with interruptible(orders, lambda text: None, real=True), progress.shown():
+        return live_cli.check_connected(mission, urls, timeout_s, orders, progress)
 
 
 @main.command()
@@ -220,12 +264,16 @@ def report(run: Path) -> None:
 
 
 def _load(
-    mission_file: Path | None, algorithm: str | None, vehicles: int | None, duration: float | None
-) -> "Mission":
+    mission_file: Path | None, algorithm: str | None = None, vehicles: int | None = None,
+    duration: float | None = None, autopilot: str | None = None,
+) -> "Mission":  # fmt: skip
+    """The mission with what the command line says over it."""
+    from .mission.launch import flown_by
     from .mission.load import load
 
     given = {"planner.algorithm": algorithm, "vehicles.count": vehicles, "duration_s": duration}
-    return load(mission_file, {key: value for key, value in given.items() if value is not None})
+    mission = load(mission_file, {key: value for key, value in given.items() if value is not None})
+    return mission if autopilot is None else flown_by(mission, autopilot)
 
 
 def _refuse_what_stubs_cannot(mission: "Mission") -> None:
@@ -241,8 +289,6 @@ def _refuse_what_stubs_cannot(mission: "Mission") -> None:
         )
     if len(mission.fleet) > MOST_SYSTEMS:
         complaints.append(f"vehicles: MAVLink tells {MOST_SYSTEMS} vehicles apart (fly fewer, or study more)")
-    if any(v.connect for v in mission.fleet):
-        complaints.append("vehicles.connect: give --connect URL on the command line instead")
     if mission.launch == "as_found":
         complaints += _stub_pads(mission)
     if complaints:

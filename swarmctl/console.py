@@ -3,9 +3,8 @@
 import json
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,10 +12,9 @@ import click
 from .core.planners import MODULES
 
 if TYPE_CHECKING:
-    from .core.world import World
-    from .flight.fly import Orders, Report
-    from .mission.model import Mission
+    from .flight.orders import Orders
 
+INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 BAD_INPUT, FAILED, REFUSED, ABORTED, DIFFERS = 2, 1, 3, 4, 5
 
 
@@ -28,8 +26,7 @@ def say(text: str) -> None:
 @contextmanager
 def plain_errors() -> Iterator[None]:
     """Turn what bad input raises into a message and an exit code; nobody sees a traceback for it."""
-    from .flight.fly import StoppedError
-    from .flight.swarm import FlightError, RefusedError
+    from .flight.errors import FlightError, RefusedError, StoppedError
     from .mission.errors import MissionError
     from .record.errors import RecordError
     from .vehicle.addresses import AddressError
@@ -55,47 +52,29 @@ def plain_errors() -> Iterator[None]:
         sys.exit(BAD_INPUT)
 
 
+LEVELS = (
+    "returning; press Ctrl-C again to land now",
+    "landing now; again to stop at once",
+    "stopping",
+)
+LEVELS_OF_REAL_VEHICLES = (
+    "returning; press Ctrl-C again to land now",
+    "landing now, everybody where it is",
+    "still landing: vehicles are not left in the air (to abandon them to their own failsafes, kill this process)",
+)
+
+
 @contextmanager
-def interruptible(orders: "Orders") -> Iterator[None]:
-    """Ctrl-C (or SIGTERM) once: all return; twice: all land; a third time: stop at once."""
-
-    def obey(number: int, frame: FrameType | None) -> None:
-        orders.interrupt()
-        words = (
-            "",
-            "returning; press Ctrl-C again to land now",
-            "landing now; again to stop at once",
-            "stopping",
-        )
-        say(words[min(orders.level, 3)])
-
-    before: dict[int, Any] = {n: signal.signal(n, obey) for n in (signal.SIGINT, signal.SIGTERM)}
+def interruptible(orders: "Orders", tell: Callable[[str], None], real: bool) -> Iterator[None]:
+    """Ctrl-C (SIGTERM, or a closed terminal) once: all return; twice: all land; then stop, unless ``real``."""
+    words = LEVELS_OF_REAL_VEHICLES if real else LEVELS
+    orders.told = lambda level: tell(words[min(level, len(words)) - 1])
+    before: dict[int, Any] = {n: signal.signal(n, lambda *_: orders.interrupt()) for n in INTERRUPTIONS}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-def progress(mission: "Mission") -> "Report":
-    """A line for each part of the flight; on a terminal, one that moves."""
-    from .flight.swarm import Swarm
-
-    shown: list[str] = [""]
-    moving = sys.stderr.isatty()
-
-    def report(now: float, swarm: Swarm, world: "World") -> None:
-        share = float((world.found >= 0).mean()) if len(world.found) else 0.0
-        line = f"{now:7.0f} s  {swarm.part.value:<12} found {100 * share:5.1f} %"
-        if moving:
-            click.echo(f"\r{line}", err=True, nl=False)
-            if swarm.part.value == "over":
-                say("")
-        elif swarm.part.value != shown[0]:
-            say(line)
-        shown[0] = swarm.part.value
-
-    return report
 
 
 def print_summary(summary: dict[str, Any]) -> None:

@@ -6,52 +6,103 @@ import random
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import click
 
-from .flight.fly import Orders, Report, autopilots, endurance_s
-from .flight.fly_live import LiveOptions, fly_live
+from .dashboard import Progress, findings_table
+from .flight.fly import autopilots, endurance_s
+from .flight.fly_live import LiveOptions, fly_live, probe
+from .flight.orders import Orders
+from .flight.preparation import Preparation
 from .flight.results import Outcome
 from .mission.model import Mission
 from .mission.scenario import Scenario
 from .record.folder import RunFolder
-from .vehicle.addresses import Address, parse
-from .vehicle.session import Session
+from .vehicle.addresses import Address, AddressError, parse
 
 FIRST_PORT, LAST_PORT = 20000, 28000
 OWN_PORT_OFFSET = 1000
+STUB_CONNECT_S = 30.0
 
 
 def fly_with_stubs(
-    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, report: Report
+    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, progress: Progress
 ) -> Outcome:
     """Fly in wall time, times ``speed``, with stub vehicles in a process of their own, over UDP."""
     with stub_process(mission, seed, speed) as port:
-        addresses = [Address("udpin", "127.0.0.1", port + i) for i in range(len(mission.fleet))]
-        options = LiveOptions(addresses, speed=speed, connect_timeout_s=30.0, own_stubs=True)
-        return asyncio.run(fly_live(mission, seed, folder, options, orders, report))
+        options = LiveOptions(
+            [[Address("udpin", "127.0.0.1", port + i)] for i in range(len(mission.fleet))],
+            speed=speed, connect_timeout_s=STUB_CONNECT_S, own_stubs=True, watching=progress.preparing,
+        )  # fmt: skip
+        return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
 
 def fly_connected(
     mission: Mission, seed: int, folder: RunFolder, urls: Sequence[str], speed: float, timeout_s: float,
-    sure: bool, orders: Orders, report: Report,
+    sure: bool, orders: Orders, progress: Progress,
 ) -> Outcome:  # fmt: skip
     """Fly vehicles that are there already.  Raises AddressError for a bad URL."""
-    addresses = [address for url in urls for address in parse(url)]
+    confirm = None if sure else lambda preparation: confirm_typed(preparation, progress)
     options = LiveOptions(
-        addresses, speed=speed, connect_timeout_s=timeout_s, confirm=None if sure else confirm_typed
-    )
-    return asyncio.run(fly_live(mission, seed, folder, options, orders, report))
+        addresses(mission, urls), speed=speed, connect_timeout_s=timeout_s, confirm=confirm,
+        watching=progress.preparing,
+    )  # fmt: skip
+    return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
 
-async def confirm_typed(sessions: Sequence[Session]) -> bool:
+def check_connected(
+    mission: Mission, urls: Sequence[str], timeout_s: float, orders: Orders, progress: Progress
+) -> bool:
+    """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError."""
+    options = LiveOptions(addresses(mission, urls), connect_timeout_s=timeout_s, watching=progress.preparing)
+    preparation, ways = asyncio.run(probe(mission, options, orders))
+    rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))
+    click.echo(findings_table(f"{mission.name}: nothing was armed", rows))
+    for line in (*preparation.refusals.values(), *preparation.troubles):
+        click.echo(line)
+    return not preparation.refusals
+
+
+def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
+    """Where each vehicle may be heard: at any of ``urls``, or else where the mission says.  Raises AddressError."""
+    if urls:
+        anywhere = [address for url in urls for address in parse(url)]
+        return [anywhere] * len(mission.fleet)
+    return [parse(vehicle.connect) if vehicle.connect else [] for vehicle in mission.fleet]
+
+
+def connects(mission: Mission, urls: Sequence[str]) -> bool:
+    """Whether real vehicles are meant.  Raises AddressError for a mission that names only some of them."""
+    named = [vehicle.connect is not None for vehicle in mission.fleet]
+    if not urls and any(named) and not all(named):
+        raise AddressError("vehicles.connect: some vehicles have one and some have none (or give --connect)")
+    return bool(urls) or all(named)
+
+
+def confirm_typed(preparation: Preparation, progress: Progress) -> "asyncio.Future[bool]":
     """Ask for a typed yes at the terminal."""
-    names = ", ".join(f"{s.system} ({s.adapter.name if s.adapter else '?'})" for s in sessions)
-    click.echo(f"ready to arm: vehicles {names}. Type yes to take off: ", err=True, nl=False)
-    answer = await asyncio.get_running_loop().run_in_executor(None, sys.stdin.readline)
-    return str(answer).strip().lower() == "yes"
+    for line in (*preparation.refusals.values(), *preparation.troubles):
+        progress.say(line)
+    names = ", ".join(
+        f"{system} ({findings[0].value})"
+        for row, (system, findings) in enumerate(zip(preparation.systems, preparation.findings, strict=True))
+        if row not in preparation.refusals
+    )
+    progress.say(f"ready to arm: vehicles {names}. Type yes to take off:")
+    loop = asyncio.get_running_loop()
+    answer: asyncio.Future[bool] = loop.create_future()
+
+    def read() -> None:
+        typed = sys.stdin.readline().strip().lower()
+        with contextlib.suppress(RuntimeError):  # the loop is closed: it was interrupted
+            loop.call_soon_threadsafe(answer.set_result, typed == "yes")
+
+    # A thread that nobody waits for: an interrupted program must not hang until a line is typed.
+    threading.Thread(target=read, daemon=True).start()
+    return answer
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """One flight in lockstep from mission to run folder: set up, fly, write down."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,32 +18,17 @@ from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
 
 from . import clock
+from .errors import StoppedError
 from .journal import Journal
 from .lockstep import Lockstep, Vehicles
+from .orders import Orders
+from .preparation import Preparation
 from .results import Outcome
 from .swarm import Part, Swarm
 from .track import Track
 
 REPORT_EVERY_S = 10.0
-
-
 STUB_RESERVE_S = 600.0
-
-
-class StoppedError(Exception):
-    """The operator stopped the program at once; vehicles are left to their own failsafe."""
-
-
-@dataclass
-class Orders:
-    """What the operator asks for while the flight is under way: 1 all return, 2 all land."""
-
-    level: int = 0
-    obeyed: int = 0
-
-    def interrupt(self) -> None:
-        """One more Ctrl-C."""
-        self.level += 1
 
 
 Report = Callable[[float, Swarm, World], None]
@@ -94,7 +78,7 @@ def fly(
     folder.write_text(folder.mission, text)
     journal = Journal(folder, world, text, about_flight(mission, world, seed))
     try:
-        swarm = Swarm(mission, world, sessions, journal)
+        swarm = Swarm(mission, world, sessions, journal, Preparation(mission, sessions, now=0.0))
         track = Track(len(sessions))
         lockstep = Lockstep(swarm, sessions, vehicles, journal, track, interval, mission.duration_s)
         began = clock.wall_s()
@@ -124,15 +108,22 @@ def about_flight(mission: Mission, world: World, seed: int) -> dict[str, str]:
     }
 
 
-def obey_and_report(swarm: Swarm, world: World, orders: Orders, report: Report) -> Callable[[float], None]:
-    """Obey the operator, and report now and then."""
+def obey_and_report(
+    swarm: Swarm, world: World, orders: Orders, report: Report, every_s: float = REPORT_EVERY_S,
+    may_stop: bool = True,
+) -> Callable[[float], None]:  # fmt: skip
+    """Obey the operator, and report every ``every_s`` of flight time.
+
+    ``may_stop``: a third Ctrl-C stops the program at once, which raises StoppedError.  Real vehicles are never
+    left in the air by that.
+    """
     due = 0.0
 
     def each_tick(now: float) -> None:
         nonlocal due
         if orders.level > orders.obeyed:
             orders.obeyed = orders.level
-            if orders.level > 2:
+            if orders.level > 2 and may_stop:
                 raise StoppedError(
                     "stopped at once, not everybody down; the recording ends here (replay reads it)"
                 )
@@ -141,7 +132,7 @@ def obey_and_report(swarm: Swarm, world: World, orders: Orders, report: Report) 
             else:
                 swarm.land_all(now)
         if now >= due or swarm.part is Part.OVER:
-            due = now + REPORT_EVERY_S
+            due = now + every_s
             report(now, swarm, world)
 
     return each_tick

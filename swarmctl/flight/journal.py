@@ -1,11 +1,14 @@
 """The flight's recorder: what the loop tells it goes to flight.mcap and flight.tlog, the oldest first."""
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from swarmctl.core.world import World
 from swarmctl.record import rows
+from swarmctl.record.errors import RecordError
 from swarmctl.record.folder import RunFolder
 from swarmctl.record.mcap_log import Channel, McapLog
 from swarmctl.record.tlog import TlogWriter
@@ -15,6 +18,13 @@ FLUSH_S = 30.0
 
 By flight time, so that the same flight writes the same bytes.
 """
+
+
+class _Nowhere:
+    """Takes every record and keeps none."""
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_, **__: None
 
 
 class Journal:
@@ -30,8 +40,8 @@ class Journal:
     ) -> None:
         self._flush_s = flush_s
         self._world = world
-        self._log = McapLog(folder.mcap)
-        self._tlog = TlogWriter(folder.tlog)
+        self._log: Any = McapLog(folder.mcap)
+        self._tlog: Any = TlogWriter(folder.tlog)
         self._tick_rows = np.zeros(len(world.fleet), rows.TICK)
         self._flushed = 0.0
         self._log.attach("mission.yaml", mission_text)
@@ -82,6 +92,13 @@ class Journal:
         self._log.write_json(
             "/events", now, {"time_s": round(now, 3), "vehicle": vehicle, "kind": kind, "text": text}
         )
+
+    def stop(self) -> None:
+        """Record nothing more, and never raise again: the disk refuses, or the flight is being broken off."""
+        for file in (self._log, self._tlog):
+            with contextlib.suppress(RecordError, OSError):
+                file.close()
+        self._log = self._tlog = _Nowhere()
 
     def breathe(self, now: float) -> None:
         """Now and then give what was written to the operating system."""

@@ -1,37 +1,69 @@
 """Live flight: the same swarm on the wall's clock, its vehicles behind UDP, TCP or a serial line.
 
-First every vehicle's session is brought to READY, then the world is built about where they stand, then one
-task ticks on absolute deadlines.  All times are flight time: the wall's times the speed of the simulation, so
-sessions, swarm and records never know.  If a tick fails, whatever the reason, all vehicles are told to land
-and their sessions are run until they have.
+First every vehicle's session is prepared, then the world is built about where they stand, then one task ticks
+on absolute deadlines.  All times are flight time: the wall's times the speed of the simulation, so sessions,
+swarm and records never know.  Nobody is left flying unattended: if a tick fails, whatever the reason, all
+vehicles are told to land and their sessions are run until they have; if only the recording fails, all return
+without it.
 """
 
 import asyncio
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
-from swarmctl.core.state import POSE
+from swarmctl.core.arrays import Records
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
+from swarmctl.record.errors import RecordError
 from swarmctl.vehicle.addresses import Address
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
-from swarmctl.vehicle.phases import FLYING, Phase
+from swarmctl.vehicle.phases import FLYING
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
-from swarmctl.vehicle.switchboard import Switchboard
 from swarmctl.vehicle.transports import TransportError
 
+from .errors import RefusedError, StoppedError
 from .journal import Journal
-from .swarm import GONE, Part, RefusedError, Swarm
+from .preparation import Preparation
+from .swarm import Part, Swarm
 from .track import Track
 
 SETTLE_S = 1.0
 """After the last vehicle was first heard: more of them would make it unclear which are meant."""
-PREPARE_S = 120.0
+CALL_S = 0.2
+POLL_S = 0.02
 LANDING_S = 300.0
 BEHIND_S = 0.5
 """A loop that is late by more than this gives up catching up."""
 
-assert POSE.names
+
+class Wires(Protocol):
+    """What a live link needs of the switchboard."""
+
+    @property
+    def heard(self) -> list[int]:
+        """System ids of the vehicles whose heartbeat came, ascending."""
+
+    async def open(self, addresses: list[Address]) -> None:
+        """Open all addresses.  Raises TransportError."""
+
+    def subscribe(self, deliver: Callable[[int, bytes], None]) -> None:
+        """Have the vehicles' bytes handed on from now on."""
+
+    def address(self, system: int) -> Address:
+        """The address that a vehicle was heard on."""
+
+    def way(self, system: int) -> str:
+        """The same and where it sends from, for people."""
+
+    def send(self, system: int, frame: bytes) -> None:
+        """Send a frame to a vehicle."""
+
+    def call(self, frame: bytes) -> None:
+        """Send a frame on every wire."""
+
+    def close(self) -> None:
+        """Close every wire."""
 
 
 class FlightClock:
@@ -48,64 +80,88 @@ class FlightClock:
 
 
 class LiveLink:
-    """Every vehicle of a live flight: its session, and the wires its frames go by."""
+    """Every vehicle of a live flight: its session, and the wires its frames go by.
 
-    def __init__(self, clock: FlightClock) -> None:
+    ``look`` is called while waiting, with the sessions so far; what it raises ends the waiting.
+    """
+
+    def __init__(
+        self, clock: FlightClock, wires: Wires, look: Callable[[float, Sequence[Session]], None]
+    ) -> None:
         self.clock = clock
         self.sessions: list[Session] = []
-        self.switchboard = Switchboard()
+        self.wires = wires
+        self._look = look
         self._by_system: dict[int, Session] = {}
         self._early: list[tuple[float, list[bytes]]] = []
         self._journal: Journal | None = None
 
     async def connect(
-        self, addresses: Sequence[Address], count: int, settings: SessionSettings, timeout_s: float
+        self, addresses: Sequence[Sequence[Address]], settings: SessionSettings, timeout_s: float
     ) -> None:
-        """Open the addresses and wait (wall seconds) for ``count`` vehicles.  Raises RefusedError."""
+        """Open ``addresses``, those of each vehicle, and wait (wall seconds) for all.  Raises RefusedError."""
+        places = list(dict.fromkeys(address for own in addresses for address in own))
         try:
-            await self.switchboard.open(list(addresses))
+            await self.wires.open(places)
         except TransportError as error:
             raise RefusedError(str(error)) from None
-        caller = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
-        await self._wait_for(count, caller, timeout_s)
-        systems = self.switchboard.heard
-        if len(systems) < count:
-            heard = ", ".join(map(str, systems)) or "none"
-            places = ", ".join(map(str, addresses[:6])) + (" ..." if len(addresses) > 6 else "")
+        await self._wait_for(addresses, timeout_s)
+        systems = self._assign(addresses)
+        if None in systems:
+            heard = ", ".join(map(str, self.wires.heard)) or "none"
+            named = ", ".join(map(str, places[:6])) + (" ..." if len(places) > 6 else "")
+            found = len(systems) - systems.count(None)
             raise RefusedError(
-                f"heard {len(systems)} of {count} vehicles (system ids: {heard}) on {places} within {timeout_s:g} s"
+                f"heard {found} of {len(systems)} vehicles (system ids: {heard}) on {named} within {timeout_s:g} s"
             )
-        for system in systems[:count]:
+        for system in systems:
+            assert system is not None
             session = Session(system, settings=settings, now=self.clock.now())
             self.sessions.append(session)
             self._by_system[system] = session
-        self.switchboard.subscribe(self._take)
+        self.wires.subscribe(self._take)
 
-    async def _wait_for(self, count: int, caller: Encoder, timeout_s: float) -> None:
+    def _assign(self, addresses: Sequence[Sequence[Address]]) -> list[int | None]:
+        """For each vehicle the lowest system id heard at its addresses and not given away yet."""
+        free = list(self.wires.heard)
+        systems: list[int | None] = []
+        for own in addresses:
+            system = next((s for s in free if self.wires.address(s) in own), None)
+            systems.append(system)
+            if system is not None:
+                free.remove(system)
+        return systems
+
+    async def _wait_for(self, addresses: Sequence[Sequence[Address]], timeout_s: float) -> None:
         """Call and listen until enough vehicles were heard, and a moment longer."""
         loop = asyncio.get_running_loop()
+        caller = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
         end = loop.time() + timeout_s
         enough_at: float | None = None
         while loop.time() < end:
-            self.switchboard.call(caller.heartbeat(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4))
-            await asyncio.sleep(0.2)
-            if len(self.switchboard.heard) >= count:
+            self.wires.call(caller.heartbeat(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4))
+            await asyncio.sleep(CALL_S)
+            self._look(self.clock.now(), ())
+            if None not in self._assign(addresses):
                 enough_at = enough_at or loop.time()
                 if loop.time() >= enough_at + SETTLE_S:
                     return
 
-    async def prepare(self) -> None:
-        """Bring every session to READY.  Raises RefusedError, naming the vehicles that are not."""
-        end = self.clock.now() + PREPARE_S
-        while any(s.phase not in (*GONE, Phase.READY) for s in self.sessions) and self.clock.now() < end:
-            self.poll()
-            await asyncio.sleep(0.05 / self.clock.speed)
-        unready = [s for s in self.sessions if s.phase is not Phase.READY]
-        if unready:
-            reasons = "\n".join(
-                f"vehicle {s.system} is {s.phase.value}: {s.reason or 'no answer'}" for s in unready
-            )
-            raise RefusedError(reasons)
+    async def prepare(self, preparation: Preparation) -> None:
+        """Have every session ready, inspected and fenced."""
+        while not preparation.done:
+            now = self.poll()
+            preparation.tick(now)
+            self.flush(now)
+            self._look(now, self.sessions)
+            await asyncio.sleep(POLL_S / self.clock.speed)
+
+    async def wait(self, task: "asyncio.Future[bool]") -> bool:
+        """Keep the links alive until ``task`` is done; its result."""
+        while not task.done():
+            self._look(self.poll(), self.sessions)
+            await asyncio.sleep(POLL_S)
+        return task.result()
 
     def record(self, journal: Journal) -> None:
         """From now on frames go to ``journal``; those from before go first."""
@@ -123,24 +179,27 @@ class LiveLink:
         return now
 
     def flush(self, now: float) -> None:
-        """Send and record what the sessions have queued."""
+        """Send what the sessions have queued, then record it."""
         for session in self.sessions:
-            self._flush(session, now)
+            self._send(session)
+        for session in self.sessions:
+            self._record(session, now)
 
     def close(self) -> None:
         """Close every wire."""
-        self.switchboard.close()
+        self.wires.close()
 
     def _take(self, system: int, data: bytes) -> None:
         session = self._by_system.get(system)
         if session is not None:
-            now = self.clock.now()
-            session.receive(data, now)
-            self._flush(session, now)
+            session.receive(data, self.clock.now())
+            self._send(session)
 
-    def _flush(self, session: Session, now: float) -> None:
+    def _send(self, session: Session) -> None:
         for frame in session.outgoing():
-            self.switchboard.send(session.system, frame)
+            self.wires.send(session.system, frame)
+
+    def _record(self, session: Session, now: float) -> None:
         frames = session.traffic()
         if not frames:
             return
@@ -153,19 +212,27 @@ class LiveLink:
 class LiveLoop:
     """Ticks a swarm on absolute deadlines until the flight is over."""
 
-    def __init__(self, link: LiveLink, swarm: Swarm, poses: Callable[[], object], journal: Journal, track: Track,
-                 interval_s: float) -> None:  # fmt: skip
+    def __init__(
+        self, link: LiveLink, swarm: Swarm, poses: Callable[[], Records], journal: Journal, track: Track,
+        interval_s: float,
+    ) -> None:  # fmt: skip
         self._link, self._swarm, self._journal, self._track = link, swarm, journal, track
         self._poses = poses
         self._interval_s = interval_s
+        self._record_error: RecordError | None = None
 
     async def run(self, each_tick: Callable[[float], None]) -> None:
         """Fly to the end.  If a tick raises, land everybody, then raise that again."""
         try:
             await self._fly(each_tick)
-        except Exception:
-            await self._land_everybody()
+        except StoppedError:
             raise
+        except BaseException:
+            self._journal.stop()
+            await asyncio.shield(self._land_everybody())
+            raise
+        if self._record_error is not None:
+            raise self._record_error
 
     async def _fly(self, each_tick: Callable[[float], None]) -> None:
         loop = asyncio.get_running_loop()
@@ -173,22 +240,34 @@ class LiveLoop:
         deadline = loop.time()
         k = 0
         while self._swarm.part is not Part.OVER:
-            now = self._link.poll()
-            self._swarm.tick(k, now)
-            self._link.flush(now)
-            self._track.add(now, self._poses())  # type: ignore[arg-type]
-            self._journal.breathe(now)
-            each_tick(now)
+            try:
+                self._tick(k, each_tick)
+            except RecordError as error:
+                self._go_home_unrecorded(error)
             k += 1
             deadline += wall_interval
             if loop.time() > deadline + BEHIND_S:
                 deadline = loop.time()
             await asyncio.sleep(max(0.0, deadline - loop.time()))
 
+    def _tick(self, k: int, each_tick: Callable[[float], None]) -> None:
+        now = self._link.poll()
+        self._swarm.tick(k, now)
+        self._link.flush(now)
+        self._track.add(now, self._poses())
+        self._journal.breathe(now)
+        each_tick(now)
+
+    def _go_home_unrecorded(self, error: RecordError) -> None:
+        """The disk is full, or gone: no reason to come down just anywhere."""
+        self._record_error = error
+        self._journal.stop()
+        self._swarm.return_all(f"the recording failed: {error}", self._link.clock.now())
+
     async def _land_everybody(self) -> None:
         """The program failed: get the vehicles down with what is left of it."""
-        self._swarm.land_all(self._link.clock.now())
+        self._swarm.roster.land()
         end = self._link.clock.now() + LANDING_S
         while any(s.phase in FLYING for s in self._link.sessions) and self._link.clock.now() < end:
             self._link.poll()
-            await asyncio.sleep(0.05)
+            await asyncio.sleep(POLL_S)

@@ -13,8 +13,9 @@ from swarmctl.core.arrays import Records
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import Session
 
+from .errors import FlightError
 from .journal import Journal
-from .swarm import FlightError, Part, Swarm
+from .swarm import Part, Swarm
 from .track import Track
 
 LONGEST_EXTRA_S = 3600.0

@@ -53,7 +53,7 @@ class Outcome:
         if self.aborted:
             return ABORTED
         never = self.swarm.search_began is None
-        if never and ("refused" in self.swarm.dropped or not self.track.airborne.any()):
+        if never and ("refused" in self.swarm.roster.dropped or not self.track.airborne.any()):
             return REFUSED
         figures = self.summary("")
         close = figures["min_separation_m"]
@@ -163,14 +163,14 @@ class Outcome:
                 "outcome": self._outcome(i, session),
                 "detected": int(self.swarm.seen[i].sum()),
                 "distance_m": round(float(flown[i]), 1),
-                "events": self.swarm.messages[i],
+                "events": self.swarm.roster.messages[i],
             }
             for i, session in enumerate(self.sessions)
         ]
 
     def _outcome(self, i: int, session: Session) -> str:
         """landed, released, lost, crashed or refused; one that never had to fly stands, and so has landed."""
-        dropped = self.swarm.dropped[i]
+        dropped = self.swarm.roster.dropped[i]
         if dropped is not None:
             return dropped
         flew = bool(self.track.airborne[:, i].any())

@@ -3,8 +3,23 @@
 All vehicles take off, wait for one another at the barrier, search, return and land.  A tick reads telemetry
 into poses, plans if a planner period has passed, steers (homing and guard) and sends the setpoints.  It knows
 neither sockets nor clocks: whoever drives it, in lockstep or live, says what time it is.
+
+What goes wrong with one vehicle in the air, and what becomes of it and of the others:
+
+| what | the vehicle | the others |
+|---|---|---|
+| failed, crashed, restarted, came down | told to land while it is armed | as `if_one_fails` says |
+| mode changed by a pilot or a failsafe | released: no order reaches it until it is retaken | as `if_one_fails` says |
+| released by order | the same | fly on |
+| silent | its firmware's failsafe; ours again when heard in our mode | as `if_one_fails` says |
+| position lost | lands where it is | as `if_one_fails` says |
+| battery low | returns | fly on |
+
+When all of ours are down, those that are not ours and still in the air are watched for a while: a silent one
+is told to land once its own failsafe has had time to bring it home.
 """
 
+import contextlib
 from collections.abc import Sequence
 from enum import Enum
 
@@ -16,16 +31,13 @@ from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
 from swarmctl.vehicle.events import Event, EventKind
-from swarmctl.vehicle.phases import FLYING, Phase
+from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import OrderError, Session
 
+from .errors import RefusedError
 from .journal import Journal
-
-EARS = ("sensor_range", "alarms_per_second", "radio_range")
-"""What a vehicle that dropped out has no more."""
-LOW_M = 0.5
-STANDING_M = 5.0
-"""A vehicle must stand within so much of the place where the mission expects it."""
+from .preparation import Preparation
+from .roster import Roster
 
 STAGE_OF = {
     Phase.TAKING_OFF: stages.TAKE_OFF,
@@ -40,18 +52,12 @@ GONE = (Phase.FAILED, Phase.RELEASED, Phase.LOST)
 QUIET = (EventKind.PHASE, EventKind.TEXT)
 
 
-CONNECT_S = 20.0
-"""A vehicle that was not heard by then is not there."""
-PREPARE_S = 180.0
-"""One that is not ready to arm by then is not going to be."""
-
-
-class FlightError(Exception):
-    """The flight cannot begin or go on; the message says which vehicle and why."""
-
-
-class RefusedError(FlightError):
-    """No vehicle, too few, or one that refuses: nothing was armed."""
+LOST_LANDING_S = 120.0
+"""After all others are down: a vehicle that is still silent by then is told to land where it is."""
+WATCH_S = 300.0
+"""After all of ours are down: those of others are watched no longer."""
+FAILURES = (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST)
+SEARCHING_STAGES = (stages.SEARCH, stages.HOLD)
 
 
 class Part(Enum):
@@ -61,21 +67,26 @@ class Part(Enum):
     TAKING_OFF = "taking off"
     SEARCHING = "searching"
     RETURNING = "returning"
+    WATCHING = "watching"  #: ours are down; somebody else's is still in the air
     OVER = "over"
 
 
 class Swarm:
     """One flight of ``world``'s vehicles, session i flying row i."""
 
-    def __init__(self, mission: Mission, world: World, sessions: Sequence[Session], journal: Journal) -> None:
+    def __init__(
+        self, mission: Mission, world: World, sessions: Sequence[Session], journal: Journal,
+        preparation: Preparation,
+    ) -> None:  # fmt: skip
         self.part = Part.PREPARING
         self.search_began: float | None = None
         self.held = False
         self.decisions = 0
-        self.messages: list[list[str]] = [[] for _ in sessions]  #: what happened to each vehicle, for people
+        self.roster = Roster(world, sessions)
         self.in_range_total = 0
         self.seen = np.zeros((len(sessions), len(world.scene.targets)), bool)  #: by each vehicle's own sensor
         self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
+        self._preparation = preparation
         origin = mission.origin
         self._origin = (origin.lat, origin.lon, origin.alt_m)
         self._wire = np.zeros((len(sessions), len(COLUMNS)))
@@ -83,17 +94,24 @@ class Swarm:
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
         self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
         self._began_at = 0
-        self.dropped: list[str | None] = [None] * len(
-            sessions
-        )  #: refused, crashed, released or lost, once it was
-        self._flown = [False] * len(sessions)
         self._battery_low = [False] * len(sessions)
-        self._ears = {name: world.fleet[name].copy() for name in EARS}
+        self._released: set[int] = set()  # by order
+        self._told_to_land: set[int] = set()
+        self._watched_since: float | None = None
 
     @property
     def planner_tick(self) -> int:
         """How many planner periods have been planned."""
         return self.decisions // len(self._sessions)
+
+    @property
+    def sessions(self) -> Sequence[Session]:
+        """The vehicles' sessions, row by row."""
+        return self._sessions
+
+    def stage(self, i: int) -> int:
+        """What vehicle i is doing: one of core.stages."""
+        return int(self._world.errands["stage"][i])
 
     @property
     def heights_m(self) -> list[float]:
@@ -102,12 +120,12 @@ class Swarm:
 
     def return_all(self, why: str, now: float) -> None:
         """Send everyone home who searches; before the search, land everyone where it is."""
-        if self.part in (Part.RETURNING, Part.OVER):
+        if self.part in (Part.RETURNING, Part.WATCHING, Part.OVER):
             return
         self.resume(now)
         self._journal.event(now, 0, "return", why)
         if self.part is not Part.SEARCHING:
-            self._land_airborne()
+            self.roster.land()
         else:
             self._world.orders[:] |= self._world.errands["stage"] == stages.SEARCH
         self.part = Part.RETURNING
@@ -131,10 +149,31 @@ class Swarm:
         stage[stage == old] = new
 
     def land_all(self, now: float) -> None:
-        """Land everyone where it is, at once."""
+        """Land everyone where it is, at once; when only others' vehicles are left in the air, watch them no more."""
         self._journal.event(now, 0, "land", "ordered by the operator")
-        self._land_airborne()
-        self.part = Part.RETURNING
+        if self.part is Part.WATCHING:
+            self.part = Part.OVER
+        else:
+            self.roster.land()
+            self.part = Part.RETURNING
+
+    def release(self, i: int, now: float) -> None:
+        """Leave one vehicle to somebody else; the others fly on.  Raises OrderError."""
+        self._sessions[i].release()
+        self._released.add(i)
+        self._note(i, now, "release", "released by the operator")
+
+    def retake(self, i: int, now: float) -> None:
+        """Take a released vehicle back: it searches on, or returns when the others do.  Raises OrderError."""
+        self._sessions[i].retake()
+        self._note(i, now, "retake", "retaken by the operator")
+        if self.part is Part.WATCHING:
+            self.part = Part.RETURNING
+
+    def _note(self, i: int, now: float, kind: str, text: str) -> None:
+        """Something that the swarm did with one vehicle, for the recording and for people."""
+        self._journal.event(now, self._sessions[i].system, kind, text)
+        self.roster.note(i, now, text)
 
     def tick(self, k: int, now: float) -> None:
         """One setpoint tick at flight time ``now``; the sessions have taken in what arrived by then."""
@@ -161,42 +200,33 @@ class Swarm:
             for event in session.events():
                 self._journal.event(event.time, event.system, event.kind.value, event.text)
                 if event.kind not in QUIET:
-                    self.messages[i].append(f"{event.time:.1f} s: {event.text}")
+                    self.roster.note(i, event.time, event.text)
                 self._mind(i, event, now)
 
     def _mind(self, i: int, event: Event, now: float) -> None:
-        """A vehicle failed, was taken over or is silent: the mission says whether the others go on."""
-        if event.kind is EventKind.REGAINED and self.dropped[i] == "lost":
-            self._take_back(i)
-        if event.kind not in (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST):
-            return
-        self._drop(i, event.kind)
-        left = self.dropped.count(None)
+        """Something went wrong with a vehicle: the mission says whether the others go on."""
+        if event.kind is EventKind.REGAINED:
+            self._welcome(i)
+        elif event.kind is EventKind.POSITION_LOST and self.part is not Part.PREPARING:
+            self.roster.troubled[i] = True
+            self.roster.deafen(i)
+            self._mind_the_others(event.text, now)
+        elif event.kind in FAILURES:
+            if event.kind is EventKind.LOST and self.part is Part.PREPARING:
+                return  # nothing is armed: it may come back, and the preparation waits only so long
+            self.roster.drop(i, event.kind)
+            if i not in self._released:
+                self._mind_the_others(event.text, now)
+
+    def _mind_the_others(self, why: str, now: float) -> None:
         safety = self._mission.safety
-        if safety.if_one_fails == "abort" or left < safety.minimum_vehicles:
-            self.return_all(event.text, now)
+        if safety.if_one_fails == "abort" or len(self.roster.active) < safety.minimum_vehicles:
+            self.return_all(why, now)
 
-    def _drop(self, i: int, kind: EventKind) -> None:
-        """Note how a vehicle was lost to the swarm; it sees and tells nothing more.  Failed in the air, it lands."""
-        session = self._sessions[i]
-        if self.dropped[i] is None:
-            failed = "crashed" if self._flown[i] and not session.telemetry.armed else "refused"
-            self.dropped[i] = {EventKind.RELEASED: "released", EventKind.LOST: "lost"}.get(kind, failed)
-        for name in EARS:
-            self._world.fleet[name][i] = 0.0
-        if kind is EventKind.FAILED and session.telemetry.armed:
-            session.land()
-
-    def _take_back(self, i: int) -> None:
+    def _welcome(self, i: int) -> None:
         """A vehicle that was silent speaks again: it belongs to the swarm, unless that took off without it."""
-        if self.part is Part.PREPARING or self._flies(i):
-            self.dropped[i] = None
-            for name in EARS:
-                self._world.fleet[name][i] = self._ears[name][i]
-
-    def _flies(self, i: int) -> bool:
-        """Whether the vehicle is in the air, as far as is known."""
-        return bool(stages.airborne(int(self._world.errands["stage"][i])))
+        if self.roster.dropped[i] == "lost" and self.roster.flies(i):
+            self.roster.take_back(i)
 
     def _heed_battery(self, i: int, now: float) -> None:
         """Send a searching vehicle home when its battery is down to what the mission keeps for the return."""
@@ -206,26 +236,24 @@ class Swarm:
         )
         if self._battery_low[i] or percent is None or percent > limit:
             return
-        if self._world.errands["stage"][i] == stages.SEARCH:
+        if self._world.errands["stage"][i] in SEARCHING_STAGES:
             self._battery_low[i] = True
             self._world.orders[i] = 1
-            text = f"battery at {percent} %: returns"
-            self._journal.event(now, self._sessions[i].system, "battery", text)
-            self.messages[i].append(f"{now:.1f} s: {text}")
+            self._note(i, now, "battery", f"battery at {percent} %: returns")
 
     def _read_telemetry(self, now: float) -> None:
         for i, session in enumerate(self._sessions):
             t = session.telemetry
-            self._flown[i] |= t.height_m > LOW_M
             age = now - t.received_at if t.positioned else 0.0
             self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age)
+        self.roster.look()
         calls.read_poses(self._wire, self._world.poses, *self._origin)
 
     def _go_on(self, k: int, now: float) -> None:
         """Move on to the next part of the flight when everybody is ready for it."""
-        active = [s for s, gone in zip(self._sessions, self.dropped, strict=True) if gone is None]
+        active = self.roster.active
         if self.part is Part.PREPARING:
-            self._await_ready(active, now)
+            self._await_ready(now)
         elif self.part is Part.TAKING_OFF:
             for session in active:
                 if session.phase is Phase.HOLDING:
@@ -234,42 +262,61 @@ class Swarm:
                 self._begin_search(k, now)
         elif self.part is Part.SEARCHING and not self._anybody_searches():
             self.part = Part.RETURNING
-        landed = self.part is Part.RETURNING and not any(s.phase in FLYING for s in self._sessions)
-        if landed or (not active and not any(s.phase in FLYING for s in self._sessions)):
-            self.part = Part.OVER
+        ends = self.part in (Part.RETURNING, Part.WATCHING) or not self.roster.active
+        if ends and self.part is not Part.OVER and not self.roster.anybody_flies_for_us:
+            self._watch(now)
+
+    def _watch(self, now: float) -> None:
+        """None of ours is in the air: the flight is over when none of others' is, or after a while."""
+        left = self.roster.unattended()
+        if self._watched_since is None:
+            self._watched_since = now
+        watched = now - self._watched_since
+        if left and watched < WATCH_S:
+            self.part = Part.WATCHING
+            for i in left:
+                if watched >= LOST_LANDING_S and self._sessions[i].phase is Phase.LOST:
+                    self._land_unheard(i, now)
+            return
+        self.part = Part.OVER
+        for i in left:
+            self._note(i, now, "left", f"left in the air: {whereabouts(self._sessions[i])}")
+
+    def _land_unheard(self, i: int, now: float) -> None:
+        """It has been silent for longer than its own way home takes: perhaps it hears though it is not heard."""
+        if i in self._told_to_land:
+            return
+        self._told_to_land.add(i)
+        with contextlib.suppress(OrderError):
+            self._sessions[i].land()
+            self._note(i, now, "land", "silent while all others are down: told to land")
 
     def _anybody_searches(self) -> bool:
-        stage = self._world.errands["stage"]
-        return bool(((stage == stages.SEARCH) | (stage == stages.HOLD)).any())
+        return bool(np.isin(self._world.errands["stage"], SEARCHING_STAGES).any())
 
-    def _await_ready(self, active: Sequence[Session], now: float) -> None:
-        """Take off when everybody is ready.  Raises RefusedError if somebody has not become so in time."""
-        if active and all(session.phase is Phase.READY for session in active):
+    def _await_ready(self, now: float) -> None:
+        """Take off when the preparation is over.  Raises RefusedError if it refuses one that is needed."""
+        self._preparation.tick(now)
+        if not self._preparation.done:
+            return
+        self._preparation.require()
+        for i in self._preparation.refusals:
+            if self.roster.dropped[i] is None:
+                self.roster.refuse(i)
+                self._note(i, now, "refused", self._preparation.refusals[i])
+        if all(session.phase is Phase.READY for session in self.roster.active):
             self._take_off(now)
-        elif now > PREPARE_S or (now > CONNECT_S and any(s.phase is Phase.CONNECTING for s in active)):
-            late = [s for s in active if s.phase is not Phase.READY]
-            raise RefusedError(
-                "\n".join(f"vehicle {s.system} is still {s.phase.value} at {now:.0f} s" for s in late)
-            )
+        elif now > self._preparation.deadline:
+            late = [s for s in self.roster.active if s.phase is not Phase.READY]
+            raise RefusedError("\n".join(f"vehicle {s.system} is {s.phase.value} again" for s in late))
 
     def _take_off(self, now: float) -> None:
-        """Everybody is ready: check where they stand, then go."""
-        self._check_places()
+        """Everybody is ready: go."""
         self.part = Part.TAKING_OFF
-        self._journal.event(now, 0, "take-off", f"{len(self._sessions)} vehicles")
+        self._journal.event(now, 0, "take-off", f"{len(self.roster.active)} vehicles")
         for i, session in enumerate(self._sessions):
-            if session.phase is Phase.READY:
+            if session.phase is Phase.READY and self.roster.dropped[i] is None:
                 session.take_off(float(self._world.fleet[i]["altitude"]))
-
-    def _check_places(self) -> None:
-        """Raise FlightError if a vehicle does not stand where the mission expects it."""
-        poses, fleet = self._world.poses, self._world.fleet
-        off = np.hypot(poses["east"] - fleet["pad_east"], poses["north"] - fleet["pad_north"])
-        for i in np.flatnonzero(off > STANDING_M).tolist():
-            raise FlightError(
-                f"vehicle {self._sessions[i].system} stands {off[i]:.0f} m from its launch place"
-                " (check the mission's origin and launch)"
-            )
 
     def _begin_search(self, k: int, now: float) -> None:
         """The barrier opens: from this tick on everybody follows its planner."""
@@ -287,20 +334,23 @@ class Swarm:
             if stage is not None:
                 errands[i]["stage"] = stage
             elif session.phase in GONE:
-                aloft = self._flies(i) and session.telemetry.height_m > LOW_M
-                errands[i]["stage"] = stages.ADRIFT if aloft else stages.GROUND
-            elif session.phase is Phase.ENGAGED and errands[i]["stage"] == stages.ADRIFT:
-                errands[i]["stage"] = stages.SEARCH  # silent for a while, and still ours
-                self._world.orders[i] = self.part is Part.RETURNING
+                errands[i]["stage"] = stages.ADRIFT if self.roster.aloft(i) else stages.GROUND
             elif session.phase is Phase.ENGAGED and errands[i]["stage"] == stages.LAND:
                 session.land()
+            elif session.phase is Phase.ENGAGED:
+                self._rejoin(i)
 
-    def _land_airborne(self) -> None:
-        for session in self._sessions:
-            try:
-                session.land()
-            except OrderError:
-                continue  # on the ground, or no longer ours
+    def _rejoin(self, i: int) -> None:
+        """A vehicle that was silent or released obeys again: it does what the others do."""
+        stage = self._world.errands["stage"]
+        if self.roster.dropped[i] == "released":
+            self._released.discard(i)
+            self.roster.take_back(i)
+        elif stage[i] != stages.ADRIFT:
+            return
+        waits = self.held or self.part is Part.TAKING_OFF
+        stage[i] = stages.HOLD if waits else stages.SEARCH
+        self._world.orders[i] = self.part is Part.RETURNING
 
     def _plan(self, tick: int, now: float) -> None:
         """Sense → know ⇄ radio → plan, for everybody."""
@@ -329,3 +379,10 @@ class Swarm:
         self._journal.after_steering(k, now)
         for session, (v_east, v_north, up, _) in zip(self._sessions, world.setpoints.tolist(), strict=True):
             session.setpoint(v_east, v_north, up)
+
+
+def whereabouts(session: Session) -> str:
+    """Where a vehicle was last, for those who have to look for it."""
+    t = session.telemetry
+    mode = session.adapter.modes.name(t.mode) if session.adapter else "unknown mode"
+    return f"{session.phase.value}, {mode}, last at {t.lat_e7 * 1e-7:.6f}, {t.lon_e7 * 1e-7:.6f}, {t.height_m:.0f} m up"

@@ -16,7 +16,7 @@ from swarmctl.core.calls import uniform
 from swarmctl.core.randoms import LAUNCH
 
 from .geometry import Regions
-from .model import Mission, VehicleGroup
+from .model import Mission, VehicleGroup, Vehicles
 
 FAR_M = 1e6
 
@@ -24,9 +24,30 @@ FAR_M = 1e6
 def as_found(mission: Mission) -> Mission:
     """The mission with real vehicles: launched where they stand, unless it says where."""
     vehicles = mission.vehicles
-    if not isinstance(vehicles, VehicleGroup) or "launch" in vehicles.model_fields_set:
+    each = (vehicles,) if isinstance(vehicles, VehicleGroup) else vehicles
+    if any("launch" in one.model_fields_set for one in each):
         return mission
-    return mission.model_copy(update={"vehicles": vehicles.model_copy(update={"launch": "as_found"})})
+    return _each(mission, launch="as_found")
+
+
+def flown_by(mission: Mission, autopilot: str) -> Mission:
+    """The mission with every vehicle of one autopilot, which stubs play, or (``auto``) of any."""
+    if autopilot != "auto":
+        stub = mission.stub.model_copy(update={"autopilot": autopilot})
+        mission = mission.model_copy(update={"stub": stub})
+    return _each(mission, autopilot=autopilot)
+
+
+def _each(mission: Mission, **update: str) -> Mission:
+    """The mission with something the same for every vehicle."""
+    vehicles = mission.vehicles
+    if isinstance(vehicles, VehicleGroup):
+        changed: Vehicles = vehicles.model_copy(update=update)
+    else:
+        changed = tuple(one.model_copy(update=update) for one in vehicles)
+    copy = mission.model_copy(update={"vehicles": changed})
+    copy.__dict__.pop("fleet", None)  # worked out from the vehicles, and copied with them
+    return copy
 
 
 def ideal_start(regions: Regions) -> Floats:

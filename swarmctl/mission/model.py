@@ -156,6 +156,7 @@ class VehicleGroup(Part):
     launch: Launch = "corner"
     spacing_m: Length = 20.0
     layer_m: NotNegative = 0.0
+    autopilot: Autopilot = "auto"
     endurance_s: Positive | None = None
 
 
@@ -295,6 +296,7 @@ class Mission(Part):
             altitude_m=group.altitude_m + index * group.layer_m,
             sensor=self.sensor,
             radio=self.radio,
+            autopilot=group.autopilot,
             launch=None if isinstance(pads, str) or index >= len(pads) else pads[index],
             endurance_s=group.endurance_s,
         )

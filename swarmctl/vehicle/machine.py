@@ -120,6 +120,7 @@ class Machine:
 
     def _identify(self) -> None:
         self.telemetry.forget()
+        self._checks.forget()
         self._watch.begin()
         self._set_ups += 1
         self.adapter = adapter_for(self._autopilot)

@@ -37,6 +37,7 @@ class Signal(Enum):
     HEARTBEAT = "heartbeat"
     STEPS_DONE = "steps done"
     STEP_FAILED = "step failed"
+    CHECK = "order: check"
     TAKE_OFF = "order: take off"
     ENGAGE = "order: engage"
     HOLD = "order: hold"
@@ -106,6 +107,7 @@ def _table() -> Table:
         (Phase.CONFIGURING, Signal.STEPS_DONE): Transition(Action.LOCATE, Phase.POSITIONING),
         (Phase.POSITIONING, Signal.STEPS_DONE): Transition(Action.CHECK, Phase.CHECKING),
         (Phase.CHECKING, Signal.STEPS_DONE): Transition(Action.REST, Phase.READY),
+        (Phase.READY, Signal.CHECK): Transition(Action.CHECK, Phase.CHECKING),
         (Phase.READY, Signal.TAKE_OFF): Transition(Action.TAKE_OFF, Phase.TAKING_OFF),
         (Phase.TAKING_OFF, Signal.STEPS_DONE): Transition(Action.REST, Phase.HOLDING),
         (Phase.HOLDING, Signal.ENGAGE): Transition(Action.ENGAGE, Phase.ENGAGING),

@@ -33,12 +33,21 @@ class Checks:
         self._link = link
         self._settings = settings
 
-    def begin(self, adapter: Adapter) -> tuple[Step, ...]:
-        """The steps, from nothing known: parameters, then the fence."""
+    def want(self, preflight: Preflight) -> None:
+        """From now on this is to be done."""
+        self._preflight = preflight
+
+    def forget(self) -> None:
+        """The vehicle may have restarted: nothing is known of it."""
         self.parameters = Parameters()
+        self.transfer = None
+
+    def begin(self, adapter: Adapter) -> tuple[Step, ...]:
+        """The steps: the parameters that are not known yet, then the fence."""
         steps: list[Step] = []
         if self._preflight.read_parameters:
-            steps += [self._reading(quantity) for quantity in adapter.quantities]
+            unknown = (q for q in adapter.quantities if self.parameters.get(q) is None)
+            steps += [self._reading(quantity) for quantity in unknown]
         if self._preflight.fence is not None:
             steps += self._fencing(self._preflight.fence)
         return tuple(steps)

@@ -30,6 +30,7 @@ from .events import Event, EventKind
 from .link import GROUND_COMPONENT, GROUND_SYSTEM
 from .machine import Machine
 from .phases import FLYING, SET_UP, TABLE, Phase, Signal
+from .preflight import Preflight
 from .reading import READERS, read_position
 from .statistics import Statistics
 from .steps import TIME_SLACK_S
@@ -40,6 +41,7 @@ HEARTBEAT: int = mav.MAVLINK_MSG_ID_HEARTBEAT
 LANDED_STATE: int = mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 COMMAND_ACK: int = mav.MAVLINK_MSG_ID_COMMAND_ACK
 STATUSTEXT: int = mav.MAVLINK_MSG_ID_STATUSTEXT
+TIMESYNC: int = mav.MAVLINK_MSG_ID_TIMESYNC
 
 # Metres and metres a second beyond which a setpoint is a mistake, and might not fit its field.
 PLAUSIBLE = 1e6
@@ -77,11 +79,19 @@ class Session(Machine):
         if now + TIME_SLACK_S >= self._heartbeat_due:
             self._heartbeat_due = now + self._settings.heartbeat_period_s
             self._link.send_heartbeat()
+            if self.phase is not Phase.CONNECTING:
+                self._link.send_message(self._tally.ping(now))
         if now + TIME_SLACK_S >= self._link_deadline():
             self._signal(Signal.LINK_LOST)
         if self._procedure is not None:
             self._advance()
         self._schedule()
+
+    def check(self, preflight: Preflight) -> None:
+        """Order: do this before flight, now and after every restart; READY when done.  Raises OrderError."""
+        self._require(Signal.CHECK)
+        self._checks.want(preflight)
+        self._signal(Signal.CHECK)
 
     def take_off(self, altitude_m: float) -> None:
         """Order: arm and climb to ``altitude_m`` above home. Raises OrderError outside READY."""
@@ -193,6 +203,16 @@ class Session(Machine):
         return self._tally.figures(self._link)
 
     @property
+    def loss(self) -> float:
+        """The share of this vehicle's messages that got lost on the way, so far."""
+        return self._link.lost / max(self._link.lost + self._link.received, 1)
+
+    @property
+    def round_trip_s(self) -> float | None:
+        """The link's last round trip; None before the first."""
+        return self._tally.pings_s[-1] if self._tally.pings_s else None
+
+    @property
     def setpoint_intervals_s(self) -> "array[float]":
         """The caller's time between each two setpoints."""
         return self._tally.setpoint_intervals_s
@@ -229,6 +249,8 @@ class Session(Machine):
             self._read_ack(frame.fields)
         elif frame.message_id == STATUSTEXT:
             self._read_text(frame.fields)
+        elif frame.message_id == TIMESYNC:
+            self._tally.pong(frame.fields, self._now)
         else:
             self._read_exchange(frame)
         if self._watch.battery_low(self.telemetry):

@@ -1,10 +1,21 @@
-"""What a link did: counts, and the spread of setpoint intervals and command round trips."""
+"""What a link did: counts, and the spread of setpoint intervals and of round trips.
+
+A round trip is measured once a heartbeat by a TIMESYNC, which firmware answers at once; that of a command
+has the firmware's own time in it.
+"""
 
 import math
 from array import array
+from collections import deque
 from dataclasses import dataclass
+from typing import Any
+
+from swarmctl.mavlink.dialect import mav
 
 from .link import Link
+
+NANOSECONDS = 1e9
+PINGS_KEPT = 8  #: an answer later than so many further pings counts for nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +40,7 @@ class Statistics:
     setpoints_refused: int  #: not finite, and so never sent
     setpoint_interval: Spread | None
     command_round_trip: Spread | None
+    round_trip: Spread | None  #: of the link
 
 
 def spread(durations_s: "array[float]") -> Spread | None:
@@ -48,7 +60,21 @@ class Tally:
         self.round_trips_s: array[float] = array("d")
         self.setpoints_sent = 0
         self.setpoints_refused = 0
+        self.pings_s: array[float] = array("d")
         self._setpoint_at = math.nan
+        self._unanswered: deque[int] = deque(maxlen=PINGS_KEPT)
+
+    def ping(self, now: float) -> Any:
+        """The TIMESYNC whose answer measures a round trip."""
+        stamp = round(now * NANOSECONDS)
+        self._unanswered.append(stamp)
+        return mav.MAVLink_timesync_message(0, stamp)
+
+    def pong(self, fields: Any, now: float) -> None:
+        """A TIMESYNC came: the answer to one of the last pings, or something else, which is ignored."""
+        if fields.tc1 != 0 and fields.ts1 in self._unanswered:
+            self._unanswered.remove(fields.ts1)
+            self.pings_s.append(now - fields.ts1 / NANOSECONDS)
 
     def setpoint(self, now: float) -> None:
         """A setpoint is sent."""
@@ -68,4 +94,5 @@ class Tally:
             setpoints_refused=self.setpoints_refused,
             setpoint_interval=spread(self.setpoint_intervals_s),
             command_round_trip=spread(self.round_trips_s),
+            round_trip=spread(self.pings_s),
         )

@@ -56,6 +56,10 @@ class Switchboard:
         wire, peer = self._ways[system]
         return f"{wire.address}" + (f" from {peer[0]}:{peer[1]}" if peer else "")
 
+    def address(self, system: int) -> Address:
+        """The address that a vehicle was heard on."""
+        return self._ways[system][0].address
+
     def send(self, system: int, frame: bytes) -> None:
         """Send a frame to a vehicle; one that was never heard is sent nothing."""
         way = self._ways.get(system)

@@ -116,7 +116,7 @@ def test_bad_flags_of_fly(
         (("fly", "--mission", "nowhere.yaml"), ("nowhere.yaml", "no such file", "packaged missions")),
         (("check", "--mission", "nowhere.yaml"), ("nowhere.yaml", "no such file")),
         (("check", "--mission", "/"), ("/: cannot be read",)),
-        (("check", "--vehicles", "3"), ("No such option",)),
+        (("check", "--seed", "3"), ("No such option",)),
         (("algos", "--verbose"), ("No such option",)),
         (("replay",), ("Missing argument 'RUN'",)),
         (("replay", "nowhere"), ("nowhere: no such run",)),

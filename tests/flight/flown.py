@@ -18,6 +18,7 @@ from sim_vehicle_stub.configured import configured_fleet
 from sim_vehicle_stub.fleet import StubFleet
 from swarmctl.core.world import World
 from swarmctl.flight import fly as flight
+from swarmctl.flight.orders import Orders
 from swarmctl.flight.results import Outcome
 from swarmctl.flight.swarm import Swarm
 from swarmctl.mission.load import load
@@ -75,7 +76,7 @@ def unwatched(now: float, swarm: Swarm, world: World) -> None:
 
 def fly(
     path: Path, settings: dict[str, object] | None = None, *, seed: int = 1, hobble: Hobble = sound,
-    watch: Callable[[flight.Orders], Watch] | None = None,
+    watch: Callable[[Orders], Watch] | None = None,
 ) -> Flown:  # fmt: skip
     """Fly the small mission as the command line does, into ``path``/run.
 
@@ -84,7 +85,7 @@ def fly(
     mission = small_mission(path, settings)
     folder = RunFolder(path / "run")
     folder.path.mkdir()
-    orders = flight.Orders()
+    orders = Orders()
 
     def make(mission: Mission, world: World) -> Any:
         endurance = flight.endurance_s(mission)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swarmctl.core import stages
 from swarmctl.core.world import World
-from swarmctl.flight.fly import Orders
+from swarmctl.flight.orders import Orders
 from swarmctl.flight.swarm import Part, Swarm
 from swarmctl.record import mcap_read
 from swarmctl.record.replay import replay
@@ -61,6 +61,10 @@ def test_all_wait_on_the_ground_for_the_one_that_comes_late(tmp_path: Path) -> N
     assert track.times_s[track.airborne.any(axis=1)][0] > 20.0
 
 
+UNDER_WAY_S = 5.0
+"""After so long a search, vehicles have left the columns over their pads."""
+
+
 def orders_at(*when: tuple[Part, int]) -> Callable[[Orders], Watch]:
     """Press Ctrl-C so many times when a part of the flight is first seen."""
 
@@ -68,6 +72,8 @@ def orders_at(*when: tuple[Part, int]) -> Callable[[Orders], Watch]:
         left = dict(when)
 
         def look(now: float, swarm: Swarm, world: World) -> None:
+            if swarm.search_began is not None and now < swarm.search_began + UNDER_WAY_S:
+                return
             for _ in range(left.pop(swarm.part, 0)):
                 orders.interrupt()
 

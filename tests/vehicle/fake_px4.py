@@ -78,7 +78,7 @@ class FakePx4:
             fields = frame.fields
             if frame.message_id == mav.MAVLINK_MSG_ID_HEARTBEAT:
                 self.ground_heartbeats += 1
-            elif fields.target_system != self.system:
+            elif frame.message_id == mav.MAVLINK_MSG_ID_TIMESYNC or fields.target_system != self.system:
                 continue
             elif frame.message_id == mav.MAVLINK_MSG_ID_COMMAND_LONG:
                 self.command(fields)

@@ -12,6 +12,7 @@ from sim_vehicle_stub.fleet import StubFleet
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
 from swarmctl.vehicle.events import Event, EventKind
+from swarmctl.vehicle.link import GROUND_SYSTEM
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.preflight import Preflight
 from swarmctl.vehicle.session import Session
@@ -192,7 +193,9 @@ class StubFlight:
     def sent(self, message_id: int, since: float = 0.0) -> list[Any]:
         """The fields of what the sessions sent."""
         return [
-            f.fields for t, f in self.crossed if t >= since and f.message_id == message_id and f.system == 255
+            f.fields
+            for t, f in self.crossed
+            if t >= since and f.message_id == message_id and f.system == GROUND_SYSTEM
         ]
 
     def commands(self, number: int, since: float = 0.0) -> list[Any]:
@@ -212,7 +215,8 @@ class StubFlight:
         return [f.result for f in self.told(mav.MAVLINK_MSG_ID_COMMAND_ACK) if f.command == number]
 
     def check_not_fought(self, seconds: float) -> None:
-        """For so long the sessions send nothing but heartbeats."""
+        """For so long the sessions send nothing but heartbeats, and what measures the link."""
         since = self.now + 1e-6
         self.run(seconds)
-        assert {f.message_id for t, f in self.crossed if t >= since and f.system == 255} == {0}
+        quiet = {mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_TIMESYNC}
+        assert {f.message_id for t, f in self.crossed if t >= since and f.system == GROUND_SYSTEM} <= quiet

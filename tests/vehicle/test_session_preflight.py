@@ -79,6 +79,7 @@ def test_nothing_is_asked_when_nothing_is_wanted(rig: Any) -> None:
         mav.MAVLINK_MSG_ID_HEARTBEAT,
         mav.MAVLINK_MSG_ID_COMMAND_LONG,
         mav.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED,
+        mav.MAVLINK_MSG_ID_TIMESYNC,
     }
     assert rig.session.parameters == {} and not rig.session.fence_verified
 
@@ -195,3 +196,32 @@ def test_garbage_in_a_vertex_does_not_stop_the_session(make_rig: Any) -> None:
     rig.vehicle.memory.keep = lambda items: shifted(items, 0, param1=float("nan"))
     rig.until_phase(Phase.FAILED)
     assert "vertex 0 is inclusion of 0" in rig.session.reason
+
+
+def test_a_fence_ordered_later_is_set_and_parameters_are_not_read_again(make_rig: Any) -> None:
+    rig = make_rig(preflight=READ)
+    rig.vehicle.memory.parameters = {"MPC_XY_VEL_MAX": 12.0, "MPC_ACC_HOR": 3.0}
+    rig.vehicle.memory.unknown_answered = True
+    rig.until_phase(Phase.READY)
+    rig.session.traffic()
+    rig.session.check(Preflight(read_parameters=True, fence=FENCE.fence))
+    rig.until_phase(Phase.READY)
+    asked = [f for f in rig.session.traffic() if f[5] == 255 and b"MPC_XY_VEL_MAX" in f]
+    assert rig.session.fence_verified and rig.session.parameters["speed_mps"] == 12.0 and not asked
+
+
+def test_after_a_restart_all_that_was_ordered_is_done_again(make_rig: Any) -> None:
+    rig = make_rig()
+    rig.vehicle.memory.parameters = PX4
+    rig.until_phase(Phase.READY)
+    rig.session.check(Preflight(read_parameters=True, fence=FENCE.fence))
+    rig.until_phase(Phase.READY)
+    rig.vehicle.memory.parameters = {**PX4, "MPC_XY_VEL_MAX": 9.0}
+    rig.vehicle.out.clear()
+    rig.vehicle.position(rig.now + 100.0)
+    rig.vehicle.position(rig.now)
+    rig.tick()
+    assert rig.session.phase is Phase.IDENTIFYING and not rig.session.fence_verified
+    rig.until_phase(Phase.READY)
+    assert rig.session.fence_verified and rig.session.parameters["speed_mps"] == 9.0
+    assert rig.vehicle.memory.uploads == 2

@@ -93,6 +93,7 @@ CAUSES: dict[Signal, Callable[[Any], None]] = {
     Signal.HEARTBEAT: hear,
     Signal.STEPS_DONE: finish,
     Signal.STEP_FAILED: break_off,
+    Signal.CHECK: lambda rig: rig.session.check(Preflight(read_parameters=True)),
     Signal.TAKE_OFF: lambda rig: rig.session.take_off(20.0),
     Signal.ENGAGE: lambda rig: rig.session.engage(),
     Signal.HOLD: lambda rig: rig.session.hold(),
@@ -171,6 +172,7 @@ def test_an_order_out_of_place_is_refused_and_changes_nothing(make_rig: Any, pha
     rig.reach(Phase.LANDING if phase is Phase.LANDED else phase)
     rig.until_phase(phase)
     orders = {
+        Signal.CHECK: lambda: rig.session.check(PREFLIGHT),
         Signal.TAKE_OFF: lambda: rig.session.take_off(20.0),
         Signal.ENGAGE: rig.session.engage,
         Signal.HOLD: rig.session.hold,

@@ -1,0 +1,106 @@
+"""From the first heartbeat to "may be armed": every vehicle ready, inspected, its own fence set and read back.
+
+The fence is set only once a vehicle has passed the inspection: one that stands elsewhere must not be given the
+fence of another place.  Whoever flies the swarm ticks this, in lockstep or live; it knows no clock.
+"""
+
+from collections.abc import Sequence
+from enum import Enum, auto
+
+from swarmctl.mission.model import Mission
+from swarmctl.vehicle.phases import Phase
+from swarmctl.vehicle.preflight import Preflight
+from swarmctl.vehicle.session import Session
+
+from .errors import RefusedError
+from .inspection import Finding, Inspection
+
+PREPARE_S = 180.0
+"""A vehicle that is not ready to arm by then is not going to be."""
+CONNECT_S = 20.0
+"""One that was not heard by then is not there."""
+
+
+class _Part(Enum):
+    READYING = auto()
+    FENCING = auto()
+    DONE = auto()
+
+
+class Preparation:
+    """Prepares ``sessions`` for ``mission``; session i is its vehicle i."""
+
+    def __init__(self, mission: Mission, sessions: Sequence[Session], now: float) -> None:
+        self.refusals: dict[int, str] = {}  #: why a vehicle may not be armed, by its row
+        self._mission, self._sessions = mission, sessions
+        self._inspection = Inspection(mission, sessions)
+        self.deadline = now + PREPARE_S
+        self._part = _Part.READYING
+        self._began = now
+
+    @property
+    def done(self) -> bool:
+        """Whether there is nothing more to wait for."""
+        return self._part is _Part.DONE
+
+    @property
+    def systems(self) -> list[int]:
+        """The vehicles' system ids, row by row."""
+        return [session.system for session in self._sessions]
+
+    @property
+    def findings(self) -> list[list[Finding]]:
+        """What there is to say of each vehicle."""
+        return [self._inspection.vehicle(i) for i in range(len(self._sessions))]
+
+    @property
+    def troubles(self) -> list[str]:
+        """What the operator should know and that refuses nobody, a line each."""
+        return [
+            f"vehicle {session.system}: {finding.trouble}"
+            for session, findings in zip(self._sessions, self.findings, strict=True)
+            for finding in findings
+            if finding.trouble and not finding.refuses
+        ]
+
+    def tick(self, now: float) -> None:
+        """Go on, once the sessions have taken in what arrived by ``now``."""
+        if self.done or not self._settled(now):
+            return
+        for i, session in enumerate(self._sessions):
+            if i not in self.refusals and (reason := self._refusal(i, now)):
+                self.refusals[i] = f"vehicle {session.system} {reason}"
+        if self._part is _Part.FENCING:
+            self._part = _Part.DONE
+            return
+        self._part = _Part.FENCING
+        preflight = Preflight(read_parameters=True, fence=self._inspection.fence())
+        for i, session in enumerate(self._sessions):
+            if i not in self.refusals:
+                session.check(preflight)
+
+    def require(self) -> None:
+        """Raise RefusedError if the mission does not want to fly without those that were refused."""
+        safety = self._mission.safety
+        left = len(self._sessions) - len(self.refusals)
+        if self.refusals and (safety.if_one_fails == "abort" or left < safety.minimum_vehicles):
+            raise RefusedError("\n".join(self.refusals.values()))
+
+    def _settled(self, now: float) -> bool:
+        """Whether every vehicle is ready, gave up, or has had its time."""
+        waited = now - self._began
+        return all(
+            session.phase in (Phase.READY, Phase.FAILED)
+            or i in self.refusals
+            or waited > (CONNECT_S if session.phase is Phase.CONNECTING else PREPARE_S)
+            for i, session in enumerate(self._sessions)
+        )
+
+    def _refusal(self, i: int, now: float) -> str:
+        """Why vehicle i may not be armed, or nothing."""
+        session = self._sessions[i]
+        if session.phase is Phase.FAILED:
+            return f"gave up: {session.reason.removeprefix(f'vehicle {session.system}: ')}"
+        if session.phase is not Phase.READY:
+            return f"is still {session.phase.value} at {now:.0f} s"
+        return "; ".join(finding.trouble for finding in self._inspection.vehicle(i) if finding.refuses)
