@@ -174,7 +174,7 @@ def _fence(session: Session) -> Finding:
     action = session.parameters.get("fence_action")
     does = "its action cannot be read" if action is None else f"action {action:g}"
     if not session.fence_verified:
-        return Finding("fence", "not set", "the mission's fence is not on board")
+        return Finding("fence", "not set", "the fence of the mission is not on board")
     enabled = session.parameters.get("fence_enabled", 1.0)
-    trouble = "" if enabled else "it is on board but disabled (FENCE_ENABLE 0)"
+    trouble = "" if enabled else "its fence is on board but disabled (FENCE_ENABLE 0)"
     return Finding("fence", f"verified, {does}", trouble)

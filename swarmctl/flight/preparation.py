@@ -15,10 +15,12 @@ from swarmctl.vehicle.session import Session
 from .errors import RefusedError
 from .inspection import Finding, Inspection
 
-PREPARE_S = 180.0
-"""A vehicle that is not ready to arm by then is not going to be."""
+PREPARE_S = 600.0
+"""A session gives up by itself when a step takes too long; this bounds all steps together."""
 CONNECT_S = 20.0
-"""One that was not heard by then is not there."""
+"""A vehicle that was not heard by then is not there."""
+LOST_S = 60.0
+"""One that has been silent for so long does not come back."""
 
 
 class _Part(Enum):
@@ -37,6 +39,7 @@ class Preparation:
         self.deadline = now + PREPARE_S
         self._part = _Part.READYING
         self._began = now
+        self._silent_since: dict[int, float] = {}
 
     @property
     def done(self) -> bool:
@@ -88,13 +91,16 @@ class Preparation:
 
     def _settled(self, now: float) -> bool:
         """Whether every vehicle is ready, gave up, or has had its time."""
-        waited = now - self._began
-        return all(
-            session.phase in (Phase.READY, Phase.FAILED)
-            or i in self.refusals
-            or waited > (CONNECT_S if session.phase is Phase.CONNECTING else PREPARE_S)
-            for i, session in enumerate(self._sessions)
-        )
+        settled = [i in self.refusals or self._is_settled(i, now) for i in range(len(self._sessions))]
+        return all(settled)
+
+    def _is_settled(self, i: int, now: float) -> bool:
+        phase = self._sessions[i].phase
+        if phase is Phase.LOST:
+            return now - self._silent_since.setdefault(i, now) > LOST_S
+        self._silent_since.pop(i, None)
+        patience = CONNECT_S if phase is Phase.CONNECTING else PREPARE_S
+        return phase in (Phase.READY, Phase.FAILED) or now - self._began > patience
 
     def _refusal(self, i: int, now: float) -> str:
         """Why vehicle i may not be armed, or nothing."""

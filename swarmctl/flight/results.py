@@ -14,6 +14,7 @@ from swarmctl.mission.model import Mission
 from swarmctl.record import summary
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import Session
+from swarmctl.vehicle.statistics import Spread, Statistics
 
 from .swarm import Swarm
 from .track import Track
@@ -60,11 +61,10 @@ class Outcome:
         unsafe = figures["geofence_violations"] > 0 or (
             close is not None and close < self.mission.safety.separation_m
         )
-        return (
-            BROKEN
-            if never or unsafe or any(v["outcome"] != "landed" for v in figures["per_vehicle"])
-            else DONE
+        failed = any(self.swarm.roster.troubled) or any(
+            v["outcome"] != "landed" for v in figures["per_vehicle"]
         )
+        return BROKEN if never or unsafe or failed else DONE
 
     def complaints(self) -> list[str]:
         """What went wrong, a line each."""
@@ -72,6 +72,11 @@ class Outcome:
             f"vehicle {session.system}: {self._outcome(i, session)}"
             for i, session in enumerate(self.sessions)
             if self._outcome(i, session) != "landed"
+        ]
+        lines += [
+            f"vehicle {session.system}: landed away from its pad"
+            for session, troubled in zip(self.sessions, self.swarm.roster.troubled, strict=True)
+            if troubled
         ]
         nearest, wanted = self.min_separation_m(), self.mission.safety.separation_m
         if nearest is not None and nearest < wanted:
@@ -163,6 +168,7 @@ class Outcome:
                 "outcome": self._outcome(i, session),
                 "detected": int(self.swarm.seen[i].sum()),
                 "distance_m": round(float(flown[i]), 1),
+                "link": _link(session.statistics()),
                 "events": self.swarm.roster.messages[i],
             }
             for i, session in enumerate(self.sessions)
@@ -175,6 +181,30 @@ class Outcome:
             return dropped
         flew = bool(self.track.airborne[:, i].any())
         return "landed" if session.phase is Phase.LANDED or not flew else "lost"
+
+
+def _link(figures: Statistics) -> dict[str, Any]:
+    """One vehicle's link: counts, and spreads in milliseconds of flight time."""
+    heard = figures.messages_received + figures.messages_lost
+    return {
+        "messages_received": figures.messages_received,
+        "messages_lost": figures.messages_lost,
+        "loss": round(figures.messages_lost / heard, 6) if heard else 0.0,
+        "messages_late": figures.messages_late,
+        "messages_bad": figures.messages_bad,
+        "setpoints_sent": figures.setpoints_sent,
+        "setpoint_interval_ms": _milliseconds(figures.setpoint_interval),
+        "round_trip_ms": _milliseconds(figures.round_trip),
+        "command_round_trip_ms": _milliseconds(figures.command_round_trip),
+    }
+
+
+def _milliseconds(spread: Spread | None) -> dict[str, float] | None:
+    """A spread of durations; None where there was nothing to spread."""
+    if spread is None:
+        return None
+    seconds = {"min": spread.minimum_s, "p50": spread.median_s, "p99": spread.p99_s, "max": spread.maximum_s}
+    return {name: round(1e3 * value, 3) for name, value in seconds.items()}
 
 
 def _seconds_in_air(track: Track) -> float:

@@ -99,10 +99,12 @@ class Roster:
                 continue  # on the ground, or no longer ours
 
     def unattended(self) -> list[int]:
-        """Rows of those that somebody else, or nobody, flies: released and armed, or lost in the air."""
+        """Rows of those in the air that nobody here flies: taken over, silent, or beyond help."""
         return [
             i
             for i, session in enumerate(self._sessions)
-            if (session.phase is Phase.RELEASED and session.telemetry.armed)
+            if (
+                session.phase in (Phase.RELEASED, Phase.FAILED) and session.telemetry.armed and self._flown[i]
+            )
             or (session.phase is Phase.LOST and self.aloft(i))
         ]

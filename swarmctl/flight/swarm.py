@@ -13,13 +13,14 @@ What goes wrong with one vehicle in the air, and what becomes of it and of the o
 | released by order | the same | fly on |
 | silent | its firmware's failsafe; ours again when heard in our mode | as `if_one_fails` says |
 | position lost | lands where it is | as `if_one_fails` says |
+| stands still against its setpoints | lands where it is | as `if_one_fails` says |
+| does not come home in time | lands where it is | return anyway |
 | battery low | returns | fly on |
 
 When all of ours are down, those that are not ours and still in the air are watched for a while: a silent one
 is told to land once its own failsafe has had time to bring it home.
 """
 
-import contextlib
 from collections.abc import Sequence
 from enum import Enum
 
@@ -32,12 +33,13 @@ from swarmctl.mission.model import Mission
 from swarmctl.record.rows import STATE_S
 from swarmctl.vehicle.events import Event, EventKind
 from swarmctl.vehicle.phases import Phase
-from swarmctl.vehicle.session import OrderError, Session
+from swarmctl.vehicle.session import Session
 
 from .errors import RefusedError
 from .journal import Journal
 from .preparation import Preparation
 from .roster import Roster
+from .supervision import SEARCHING, Supervision
 
 STAGE_OF = {
     Phase.TAKING_OFF: stages.TAKE_OFF,
@@ -52,12 +54,7 @@ GONE = (Phase.FAILED, Phase.RELEASED, Phase.LOST)
 QUIET = (EventKind.PHASE, EventKind.TEXT)
 
 
-LOST_LANDING_S = 120.0
-"""After all others are down: a vehicle that is still silent by then is told to land where it is."""
-WATCH_S = 300.0
-"""After all of ours are down: those of others are watched no longer."""
 FAILURES = (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST)
-SEARCHING_STAGES = (stages.SEARCH, stages.HOLD)
 
 
 class Part(Enum):
@@ -94,10 +91,8 @@ class Swarm:
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
         self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
         self._began_at = 0
-        self._battery_low = [False] * len(sessions)
         self._released: set[int] = set()  # by order
-        self._told_to_land: set[int] = set()
-        self._watched_since: float | None = None
+        self._supervision = Supervision(mission, world, sessions, self.roster, self._note)
 
     @property
     def planner_tick(self) -> int:
@@ -181,9 +176,7 @@ class Swarm:
         self._read_telemetry(now)
         self._go_on(k, now)
         self._follow_stages()
-        if self.part is Part.SEARCHING:
-            for i in range(len(self._sessions)):
-                self._heed_battery(i, now)
+        self._supervise(now)
         self._began_at += self.held
         ahead = k - self._began_at
         if self.part is Part.SEARCHING and not self.held and ahead % self._period == 0:
@@ -208,9 +201,7 @@ class Swarm:
         if event.kind is EventKind.REGAINED:
             self._welcome(i)
         elif event.kind is EventKind.POSITION_LOST and self.part is not Part.PREPARING:
-            self.roster.troubled[i] = True
-            self.roster.deafen(i)
-            self._mind_the_others(event.text, now)
+            self._trouble(i, event.text, now)
         elif event.kind in FAILURES:
             if event.kind is EventKind.LOST and self.part is Part.PREPARING:
                 return  # nothing is armed: it may come back, and the preparation waits only so long
@@ -228,23 +219,33 @@ class Swarm:
         if self.roster.dropped[i] == "lost" and self.roster.flies(i):
             self.roster.take_back(i)
 
-    def _heed_battery(self, i: int, now: float) -> None:
-        """Send a searching vehicle home when its battery is down to what the mission keeps for the return."""
-        percent, limit = (
-            self._sessions[i].telemetry.battery_percent,
-            self._mission.safety.battery_return_percent,
-        )
-        if self._battery_low[i] or percent is None or percent > limit:
-            return
-        if self._world.errands["stage"][i] in SEARCHING_STAGES:
-            self._battery_low[i] = True
-            self._world.orders[i] = 1
-            self._note(i, now, "battery", f"battery at {percent} %: returns")
+    def _supervise(self, now: float) -> None:
+        """Heed what no session tells."""
+        if self.part is Part.SEARCHING:
+            self._supervision.heed_batteries(now)
+        if self.part in (Part.SEARCHING, Part.RETURNING):
+            for i in self._supervision.disobedient(now):
+                self._bring_down(i, now, "stands still against its setpoints: lands where it is")
+        if self.part is Part.RETURNING:
+            for i in self._supervision.overdue(now):
+                self._bring_down(i, now, "did not come home in time: lands where it is")
+
+    def _bring_down(self, i: int, now: float, why: str) -> None:
+        """Land a vehicle that we cannot fly home."""
+        self._note(i, now, "land", why)
+        self._sessions[i].land()
+        self._trouble(i, f"vehicle {self._sessions[i].system} {why}", now)
+
+    def _trouble(self, i: int, why: str, now: float) -> None:
+        """It lands where it should not: it is no more use to the search, and the mission says who goes on."""
+        self.roster.troubled[i] = True
+        self.roster.deafen(i)
+        self._mind_the_others(why, now)
 
     def _read_telemetry(self, now: float) -> None:
         for i, session in enumerate(self._sessions):
             t = session.telemetry
-            age = now - t.received_at if t.positioned else 0.0
+            age = now - t.received_at + t.age_s if t.positioned else 0.0
             self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age)
         self.roster.look()
         calls.read_poses(self._wire, self._world.poses, *self._origin)
@@ -267,32 +268,18 @@ class Swarm:
             self._watch(now)
 
     def _watch(self, now: float) -> None:
-        """None of ours is in the air: the flight is over when none of others' is, or after a while."""
-        left = self.roster.unattended()
-        if self._watched_since is None:
-            self._watched_since = now
-        watched = now - self._watched_since
-        if left and watched < WATCH_S:
+        """None of ours is in the air: the flight is over when nobody is, or after a while."""
+        if self._supervision.watch(now):
             self.part = Part.WATCHING
-            for i in left:
-                if watched >= LOST_LANDING_S and self._sessions[i].phase is Phase.LOST:
-                    self._land_unheard(i, now)
             return
         self.part = Part.OVER
-        for i in left:
-            self._note(i, now, "left", f"left in the air: {whereabouts(self._sessions[i])}")
-
-    def _land_unheard(self, i: int, now: float) -> None:
-        """It has been silent for longer than its own way home takes: perhaps it hears though it is not heard."""
-        if i in self._told_to_land:
-            return
-        self._told_to_land.add(i)
-        with contextlib.suppress(OrderError):
-            self._sessions[i].land()
-            self._note(i, now, "land", "silent while all others are down: told to land")
+        for i in self.roster.unattended():
+            self._note(
+                i, now, "left", f"left in the air, as far as is known: {whereabouts(self._sessions[i])}"
+            )
 
     def _anybody_searches(self) -> bool:
-        return bool(np.isin(self._world.errands["stage"], SEARCHING_STAGES).any())
+        return bool(np.isin(self._world.errands["stage"], SEARCHING).any())
 
     def _await_ready(self, now: float) -> None:
         """Take off when the preparation is over.  Raises RefusedError if it refuses one that is needed."""

@@ -51,6 +51,8 @@ class Machine:
         self._hold_due = math.inf
         self._heard_at = now
         self._beat_at = now
+        self._answered_at: float | None = None  # a ping; None: it never has
+        self._lost_at = now
         self._set_ups = 0
         self._actions = {action: getattr(self, f"_{action.value}") for action in Action}
         self._schedule()
@@ -175,11 +177,13 @@ class Machine:
         self._report(EventKind.RELEASED, self.reason)
 
     def _suspend(self) -> None:
-        seconds = self._settings.link_loss_s * self._settings.time_scale
+        deaf = self._now + TIME_SLACK_S < self._beat_deadline()
+        self._lost_at = self._now
         self._link.expect_any()
         self._watch.forgive()
-        was = self._phase_when_lost.value
-        self._report(EventKind.LOST, f"vehicle {self.system}: no heartbeat for {seconds:g} s while {was}")
+        seconds = (self._settings.deaf_s if deaf else self._settings.link_loss_s) * self._settings.time_scale
+        what = f"{'no answer' if deaf else 'no heartbeat'} for {seconds:g} s"
+        self._report(EventKind.LOST, f"vehicle {self.system}: {what} while {self._phase_when_lost.value}")
 
     def _resume(self) -> None:
         self._report(EventKind.REGAINED, f"vehicle {self.system}: heartbeat again")
@@ -213,10 +217,20 @@ class Machine:
 
     # Time
 
+    @property
+    def _hears(self) -> bool:
+        """Whether a vehicle that was lost has answered since, if it is one that answers."""
+        return self._answered_at is None or self._answered_at >= self._lost_at
+
     def _link_deadline(self) -> float:
         """When the link counts as lost, in the phases that can lose it."""
         if (self.phase, Signal.LINK_LOST) not in TABLE:
             return math.inf
+        answered_at = math.inf if self._answered_at is None else self._answered_at
+        return min(self._beat_deadline(), answered_at + self._settings.deaf_s)
+
+    def _beat_deadline(self) -> float:
+        """When the vehicle has been silent for too long."""
         silence_s = self._settings.link_loss_s
         if self.phase not in SET_UP:
             return self._beat_at + silence_s

@@ -7,6 +7,11 @@ from swarmctl.mavlink.dialect import mav
 
 from .telemetry import GeoPoint, Telemetry
 
+DRIFT = 1e-4
+"""Seconds a second by which two clocks may drift apart."""
+LEAST_AGE_S = 0.002
+"""Less is the clocks' own millisecond."""
+
 
 def read_position(telemetry: Telemetry, fields: Any, now: float) -> None:
     """GLOBAL_POSITION_INT: mm, and cm/s north, east, down.  0, 0 is what some firmwares say before a fix."""
@@ -19,8 +24,18 @@ def read_position(telemetry: Telemetry, fields: Any, now: float) -> None:
     telemetry.v_north = fields.vx / 100.0
     telemetry.v_east = fields.vy / 100.0
     telemetry.v_up = -fields.vz / 100.0
-    telemetry.boot_ms = fields.time_boot_ms
+    _date(telemetry, fields.time_boot_ms, now)
     telemetry.received_at = now
+
+
+def _date(telemetry: Telemetry, boot_ms: int, now: float) -> None:
+    """How long the position was under way, by the vehicle's own clock; clocks may drift apart a little."""
+    offset = now - boot_ms / 1000.0
+    since_s = max(boot_ms - telemetry.boot_ms, 0) / 1000.0
+    telemetry.clock_offset_s = min(telemetry.clock_offset_s + DRIFT * since_s, offset)
+    age = offset - telemetry.clock_offset_s
+    telemetry.age_s = age if age > LEAST_AGE_S else 0.0
+    telemetry.boot_ms = boot_ms
 
 
 def read_heartbeat(telemetry: Telemetry, fields: Any) -> None:

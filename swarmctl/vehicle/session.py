@@ -8,8 +8,8 @@ differently is in its adapter.
 
 What happens in the air, and what the session does about it:
 
-- The vehicle's heartbeat is missing: LOST.  No setpoint is sent, so the firmware's own failsafe takes over;
-  only a landing that was ordered is still asked for, because a vehicle that is not heard may hear.  When the
+- The vehicle's heartbeat is missing, or it answers nothing: LOST.  No setpoint is sent, so the firmware's own
+  failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that is not heard may hear.  When the
   heartbeat is back, a vehicle that was being set up is set up again from the start, for it may have
   restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
@@ -65,6 +65,7 @@ class Session(Machine):
                 booted_ms = self.telemetry.boot_ms
                 read_position(self.telemetry, frame.fields, now)
                 if self.telemetry.boot_ms < booted_ms - RESTART_MS:
+                    self.telemetry.forget_clock()
                     self._restarted()
             else:
                 self._read(frame)
@@ -250,7 +251,8 @@ class Session(Machine):
         elif frame.message_id == STATUSTEXT:
             self._read_text(frame.fields)
         elif frame.message_id == TIMESYNC:
-            self._tally.pong(frame.fields, self._now)
+            if self._tally.pong(frame.fields, self._now):
+                self._answered_at = self._now
         else:
             self._read_exchange(frame)
         if self._watch.battery_low(self.telemetry):
@@ -268,7 +270,7 @@ class Session(Machine):
         """The vehicle lives; is it still ours?"""
         self._beat_at = self._now
         self._autopilot = fields.autopilot
-        if self.phase is Phase.LOST:
+        if self.phase is Phase.LOST and self._hears:
             set_up = self._phase_when_lost in SET_UP
             self._signal(Signal.LINK_BACK_IN_SET_UP if set_up else Signal.LINK_BACK_IN_FLIGHT)
         self._signal(Signal.HEARTBEAT)

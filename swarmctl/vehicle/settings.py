@@ -22,6 +22,7 @@ class SessionSettings:
 
     heartbeat_period_s: float = 1.0  #: our own HEARTBEAT
     link_loss_s: float = 3.0  #: without HEARTBEAT; on the ground, of silence: the link counts as lost
+    deaf_s: float = 15.0  #: without an answer to a ping, of a vehicle that did answer: it hears nothing
     ack_timeout_s: float = 0.5  #: a command without COMMAND_ACK is sent again
     attempts: int = 12  #: unanswered sendings of one command until the session gives up
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again

@@ -15,7 +15,7 @@ from swarmctl.mavlink.dialect import mav
 from .link import Link
 
 NANOSECONDS = 1e9
-PINGS_KEPT = 8  #: an answer later than so many further pings counts for nothing
+PINGS_KEPT = 16  #: an answer later than so many further pings counts for nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +70,13 @@ class Tally:
         self._unanswered.append(stamp)
         return mav.MAVLink_timesync_message(0, stamp)
 
-    def pong(self, fields: Any, now: float) -> None:
+    def pong(self, fields: Any, now: float) -> bool:
         """A TIMESYNC came: the answer to one of the last pings, or something else, which is ignored."""
-        if fields.tc1 != 0 and fields.ts1 in self._unanswered:
-            self._unanswered.remove(fields.ts1)
-            self.pings_s.append(now - fields.ts1 / NANOSECONDS)
+        if fields.tc1 == 0 or fields.ts1 not in self._unanswered:
+            return False
+        self._unanswered.remove(fields.ts1)
+        self.pings_s.append(now - fields.ts1 / NANOSECONDS)
+        return True
 
     def setpoint(self, now: float) -> None:
         """A setpoint is sent."""

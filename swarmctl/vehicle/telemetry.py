@@ -28,6 +28,8 @@ class Telemetry:
     v_north: float = 0.0
     v_up: float = 0.0
     received_at: float = float("-inf")
+    age_s: float = 0.0  #: how old that position was then, beyond the least that any took to come
+    clock_offset_s: float = float("inf")  #: the caller's clock less the vehicle's, by the quickest position
     boot_ms: int = 0  #: the vehicle's own clock at that position
     armed: bool = False
     mode: int = -1  #: HEARTBEAT.custom_mode; -1 before the first
@@ -43,6 +45,10 @@ class Telemetry:
     def positioned(self) -> bool:
         """Whether a valid position has come."""
         return self.received_at > float("-inf")
+
+    def forget_clock(self) -> None:
+        """The vehicle's clock was set anew."""
+        self.clock_offset_s, self.age_s = float("inf"), 0.0
 
     def forget(self) -> None:
         """Forget all but mode and arming, which every heartbeat tells: the vehicle may have restarted."""

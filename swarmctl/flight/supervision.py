@@ -1,0 +1,104 @@
+"""What no vehicle tells of itself: a battery that is only just enough, setpoints that are not flown, a way home
+that takes too long, and who is still in the air when all of ours are down.
+
+The swarm asks once a tick; what follows for the others is for the swarm to say.
+"""
+
+import contextlib
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from swarmctl.core import stages
+from swarmctl.core.world import World
+from swarmctl.mission.model import Mission
+from swarmctl.vehicle.phases import Phase
+from swarmctl.vehicle.session import OrderError, Session
+
+from .roster import Roster
+
+LOST_LANDING_S = 120.0
+"""After all others are down: a vehicle that is still silent by then is told to land where it is."""
+WATCH_S = 300.0
+"""After all of ours are down: those of others are watched no longer."""
+TOLD_MPS, STANDS_MPS, STANDS_S = 2.0, 0.5, 10.0
+"""A vehicle that is told to fly as fast as this and stands for so long does not fly its setpoints."""
+RETURN_S, RETURN_VEHICLE_S, DETOURS = 600.0, 10.0, 4.0
+"""The way home may take so long, so much more a vehicle, and so many times the area's diagonal."""
+SEARCHING = (stages.SEARCH, stages.HOLD)
+
+Note = Callable[[int, float, str, str], None]
+"""Called with (row, time, kind, text) of what was noticed."""
+
+
+class Supervision:
+    """Watches over the vehicles of one flight."""
+
+    def __init__(
+        self, mission: Mission, world: World, sessions: Sequence[Session], roster: Roster, note: Note
+    ) -> None:
+        self._kept_percent = mission.safety.battery_return_percent
+        self._world, self._sessions, self._roster, self._note = world, sessions, roster, note
+        self._battery_low = [False] * len(sessions)
+        self._moved_at = np.zeros(len(sessions))
+        self._told_to_land: set[int] = set()
+        self._watched_since: float | None = None
+        self._returns_since: float | None = None
+        edges = world.fences.raw
+        diagonal = math.hypot(*(edges[:, :2].max(axis=0) - edges[:, :2].min(axis=0)))
+        slowest = float(world.fleet["speed"].min())
+        self._return_s = RETURN_S + RETURN_VEHICLE_S * len(sessions) + DETOURS * diagonal / slowest
+
+    def heed_batteries(self, now: float) -> None:
+        """Order home whoever searches, or waits to, on a battery that is down to what is kept for the return."""
+        for i, session in enumerate(self._sessions):
+            percent = session.telemetry.battery_percent
+            if self._battery_low[i] or percent is None or percent > self._kept_percent:
+                continue
+            if self._world.errands["stage"][i] in SEARCHING:
+                self._battery_low[i] = True
+                self._world.orders[i] = 1
+                self._note(i, now, "battery", f"battery at {percent} %: returns")
+
+    def disobedient(self, now: float) -> list[int]:
+        """Rows of those that have stood still for a while against their setpoints; each is told once."""
+        world = self._world
+        told = np.hypot(world.setpoints["v_east"], world.setpoints["v_north"])
+        speed = np.hypot(world.poses["v_east"], world.poses["v_north"])
+        flown = np.isin(world.errands["stage"], (stages.SEARCH, stages.TRANSIT))
+        stands = flown & (told >= TOLD_MPS) & (speed < STANDS_MPS)
+        self._moved_at[~stands] = now
+        rows: list[int] = np.flatnonzero(now - self._moved_at >= STANDS_S).tolist()
+        self._moved_at[rows] = now
+        return rows
+
+    def overdue(self, now: float) -> list[int]:
+        """While all return: rows of those that should be home by now and still fly our setpoints."""
+        if self._returns_since is None:
+            self._returns_since = now
+        if now - self._returns_since < self._return_s:
+            return []
+        return [i for i, session in enumerate(self._sessions) if session.phase is Phase.ENGAGED]
+
+    def watch(self, now: float) -> bool:
+        """None of ours is in the air: whether another's is, and is worth waiting for."""
+        left = self._roster.unattended()
+        if self._watched_since is None:
+            self._watched_since = now
+        watched = now - self._watched_since
+        if not left or watched >= WATCH_S:
+            return False
+        for i in left:
+            if watched >= LOST_LANDING_S and self._sessions[i].phase is Phase.LOST:
+                self._land_unheard(i, now)
+        return True
+
+    def _land_unheard(self, i: int, now: float) -> None:
+        """It has been silent for longer than its own way home takes: perhaps it hears though it is not heard."""
+        if i in self._told_to_land:
+            return
+        self._told_to_land.add(i)
+        with contextlib.suppress(OrderError):
+            self._sessions[i].land()
+            self._note(i, now, "land", "silent while all others are down: told to land")
