@@ -322,9 +322,11 @@ def test_a_ground_station_that_is_not_heard_is_told_of_and_the_vehicle_retaken_b
     flight.set_parameter("NAV_DLL_ACT", 2)
     flight.hold_at()
     flight.impair(up_cut=True)
-    assert flight.until_phase(Phase.RELEASED) == pytest.approx(11.8 + 5.0, abs=2.0)
-    assert flight.session.reason == "vehicle 1: its mode became AUTO.RTL while holding"
+    assert flight.until(lambda: flight.mode == RTL) == pytest.approx(11.8 + 5.0, abs=1.1)
+    assert flight.texts(EventKind.LOST) == ["vehicle 1: no answer for 15 s while holding"]
     flight.impair(up_cut=False)
+    flight.until_phase(Phase.RELEASED, 3.0)
+    assert flight.session.reason == "vehicle 1: its mode became AUTO.RTL while holding"
     flight.check_not_fought(3.0)
     assert flight.mode == RTL
     flight.session.retake()
