@@ -112,6 +112,20 @@ def test_a_flight_over_a_link_that_loses_a_third(seed: int) -> None:
     flight.land()
 
 
+def test_a_few_heartbeats_that_get_lost_in_flight_are_no_lost_link() -> None:
+    """Three in a row are lost once in two minutes where a fifth of all frames is."""
+    flight = StubFlight()
+    flight.engage()
+    flight.command(1.0, 0.0)
+    flight.drop = lambda frame: frame[7] == mav.MAVLINK_MSG_ID_HEARTBEAT and frame[5] == 1
+    flight.run(7.0)
+    assert flight.session.phase is Phase.ENGAGED
+    flight.until_phase(Phase.LOST, 3.0)
+    flight.drop = lambda frame: False
+    flight.run(2.0)
+    assert flight.texts(EventKind.REGAINED) == ["vehicle 1: heartbeat again"]
+
+
 @pytest.mark.row("px4-setpoints-stop", "px4-rtl")
 def test_setpoints_that_stop_end_in_the_firmwares_own_return_and_are_not_fought() -> None:
     flight = StubFlight()
