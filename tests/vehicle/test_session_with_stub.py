@@ -11,7 +11,7 @@ from swarmctl.vehicle.events import EventKind
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.statistics import Tally
 
-from .stub_flight import ARM_DISARM, StubFlight
+from .stub_flight import ARM_DISARM, BOTH, StubFlight
 
 
 def test_take_off_fly_and_land() -> None:
@@ -146,3 +146,29 @@ def test_the_same_flight_twice_is_the_same_to_the_last_byte() -> None:
         return [frame.raw for _, frame in flight.crossed]
 
     assert fly() == fly()
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+def test_setpoints_that_are_not_flown_are_told_once_until_they_are(autopilot: str) -> None:
+    flight = StubFlight(autopilot)
+    flight.engage()
+    for k in range(2):
+        flight.command(5.0, 0.0)
+        flight.run(10.0)
+        flight.vehicle.faults.begin("ignored-setpoints")
+        flight.command(-5.0, 0.0)
+        flight.run(20.0)
+        assert flight.texts(EventKind.ASTRAY) == ["vehicle 1: it does not fly its setpoints"] * (k + 1)
+        flight.vehicle.faults.end("ignored-setpoints")
+    assert flight.session.phase is Phase.ENGAGED
+
+
+@pytest.mark.parametrize("autopilot", BOTH)
+def test_a_vehicle_that_is_turned_and_turned_is_not_astray(autopilot: str) -> None:
+    flight = StubFlight(autopilot)
+    flight.engage()
+    for k in range(40):
+        heading = 2.4 * k
+        flight.command(10.0 * math.sin(heading), 10.0 * math.cos(heading))
+        flight.run((0.5, 1.0, 1.0, 3.0, 12.0)[k % 5])
+    assert flight.texts(EventKind.ASTRAY) == []
