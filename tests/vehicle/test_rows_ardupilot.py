@@ -71,6 +71,7 @@ def test_a_refusal_to_arm_is_quoted() -> None:
 def test_what_is_read_is_asked_for_and_comes_at_its_rate() -> None:
     flight = StubFlight("ardupilot")
     flight.until_phase(Phase.READY)
+    flight.run(1.0)
     since = flight.now
     flight.run(20.0)
     counts = Counter(f.message_id for t, f in flight.crossed if t > since and f.system == 1)
