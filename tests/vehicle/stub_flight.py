@@ -4,10 +4,9 @@ Nothing here plays the vehicle's part: what a session meets is the stub, with th
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
-from sim_vehicle_stub.faults import FaultOrder
 from sim_vehicle_stub.fleet import StubFleet
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
@@ -31,8 +30,9 @@ BOTH = ("px4", "ardupilot")
 class StubFlight:
     """One session a vehicle; the first of each has a name of its own.
 
-    ``speed``: how many times faster the fleet's time runs than the sessions'.  ``drop``: which frames do not
-    arrive, either way.  ``each_tick`` is called when the sessions have heard everything of a tick.
+    ``autopilots``: what the vehicles play, unless there is a ``fleet``.  ``speed``: how many times faster the
+    fleet's time runs than the sessions'.  ``drop``: which frames do not arrive, either way.  ``each_tick`` is
+    called when the sessions have heard everything of a tick.
     """
 
     def __init__(
@@ -42,15 +42,13 @@ class StubFlight:
         tick_s: float = 0.1,
         speed: float = 1.0,
         preflight: Preflight | None = None,
-        faults: Sequence[FaultOrder] = (),
+        fleet: StubFleet | None = None,
         **settings: float,
     ) -> None:
         autopilots = autopilots or ("px4",)
         count = len(autopilots)
         pads = [(SPACING_M * k, 0.0) for k in range(count)]
-        self.fleet = StubFleet(count, origin=ORIGIN, pads_m=pads, autopilot=autopilots, seed=seed)
-        for fault in faults:
-            self.fleet.order(fault)
+        self.fleet = fleet or StubFleet(count, origin=ORIGIN, pads_m=pads, autopilot=autopilots, seed=seed)
         wanted = SessionSettings(time_scale=speed, **settings)
         self.sessions = [
             Session(v.system, settings=wanted, now=0.0, preflight=preflight) for v in self.fleet.vehicles
