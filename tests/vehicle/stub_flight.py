@@ -54,13 +54,14 @@ class StubFlight:
             Session(v.system, settings=wanted, now=0.0, preflight=preflight) for v in self.fleet.vehicles
         ]
         self.events: list[Event] = []
-        self.crossed: list[tuple[float, Frame]] = []
         self.drop: Callable[[bytes], bool] = lambda frame: False
         self.each_tick: Callable[[], Any] = lambda: None
         self.ticks = 0
         self._tick_s, self._speed = tick_s, speed
         self._pilot = Encoder(PILOT, 190)
         self._decoder = Decoder()
+        self._crossed: list[tuple[float, Frame]] = []
+        self._to_decode: list[tuple[float, bytes]] = []
 
     # The first vehicle
 
@@ -112,8 +113,7 @@ class StubFlight:
                 if not self.drop(data):
                     vehicle.receive(data, fleet_now)
             self.events += session.events()
-            for raw in session.traffic():
-                self.crossed += [(now, frame) for frame in self._decoder.feed(raw)]
+            self._to_decode += [(now, raw) for raw in session.traffic()]
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / self._tick_s)):
@@ -184,6 +184,14 @@ class StubFlight:
         self.pilot_sends(mav.MAVLink_set_mode_message(1, 1, mode))
 
     # What was seen
+
+    @property
+    def crossed(self) -> list[tuple[float, Frame]]:
+        """Every frame of the sessions and of those they heard, with the time; decoded when somebody looks."""
+        for now, raw in self._to_decode:
+            self._crossed += [(now, frame) for frame in self._decoder.feed(raw)]
+        self._to_decode.clear()
+        return self._crossed
 
     def texts(self, *kinds: EventKind) -> list[str]:
         return [event.text for event in self.events if event.kind in kinds]
