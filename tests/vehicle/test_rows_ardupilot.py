@@ -56,6 +56,21 @@ def test_a_vehicle_armed_in_stabilize_is_left_alone_until_it_has_disarmed_itself
 
 
 @pytest.mark.row("ardupilot-ready")
+def test_checks_that_pass_in_stabilize_are_not_enough_for_a_controller_that_comes_late() -> None:
+    """Not even if the heartbeat that tells of GUIDED comes before that mode's own checks."""
+    flight = StubFlight("ardupilot")
+    flight.impair(up_cut=True, down_cut=True)
+    flight.run(28.0)
+    assert flight.vehicle.personality.ready and flight.mode == STABILIZE
+    flight.impair(up_cut=False, down_cut=False)
+    flight.drop = lambda frame: (
+        frame[7] == STATUS and flight.mode == GUIDED and flight.session.telemetry.mode != GUIDED
+    )
+    flight.until_phase(Phase.READY)
+    assert flight.now >= 41.0
+
+
+@pytest.mark.row("ardupilot-ready")
 def test_a_refusal_to_arm_is_quoted() -> None:
     flight = StubFlight("ardupilot")
     flight.until_phase(Phase.READY)
