@@ -15,6 +15,7 @@ from swarmctl.vehicle.session import OrderError, Session
 EARS = ("sensor_range", "alarms_per_second", "radio_range")
 """What a vehicle that dropped out has no more."""
 LOW_M = 0.5
+NOT_OURS = (Phase.RELEASED, Phase.FAILED, Phase.LOST)
 LANDINGS_ASKED = 3
 """A vehicle that failed in the air is told to land so often; then nothing more can be done from here."""
 
@@ -111,12 +112,9 @@ class Roster:
                 continue  # on the ground, or no longer ours
 
     def unattended(self) -> list[int]:
-        """Rows of those in the air that nobody here flies: taken over, silent, or beyond help."""
+        """Rows of those that flew, are armed as far as is known, and that nobody here flies."""
         return [
             i
             for i, session in enumerate(self._sessions)
-            if (
-                session.phase in (Phase.RELEASED, Phase.FAILED) and session.telemetry.armed and self._flown[i]
-            )
-            or (session.phase is Phase.LOST and self.aloft(i))
+            if session.phase in NOT_OURS and session.telemetry.armed and self._flown[i]
         ]

@@ -150,7 +150,7 @@ class Swarm:
         """Land everyone where it is, at once; when only others' vehicles are left in the air, watch them no more."""
         self._journal.event(now, 0, "land", "ordered by the operator")
         if self.part is Part.WATCHING:
-            self.part = Part.OVER
+            self._end(now)
         else:
             self.roster.land()
             self.part = Part.RETURNING
@@ -279,7 +279,11 @@ class Swarm:
         """None of ours is in the air: the flight is over when nobody is, or after a while."""
         if self._supervision.watch(now):
             self.part = Part.WATCHING
-            return
+        else:
+            self._end(now)
+
+    def _end(self, now: float) -> None:
+        """The flight is over; who may still be in the air is told."""
         self.part = Part.OVER
         for i in self.roster.unattended():
             self._note(
