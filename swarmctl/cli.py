@@ -224,12 +224,13 @@ def check(
         mission = _load(mission_file, vehicles=vehicles)
         scenario = Scenario(mission, ideal=False)
         targets = len(scenario.scene(1).targets)
+        real = live_cli.connects(mission, urls)
         click.echo(
             f"{mission.name}: valid. {len(mission.fleet)} vehicles, {mission.planner.algorithm}, "
             f"{scenario.regions.legal.area / 1e6:.3f} km² to search inside the margin, "
             f"{len(mission.keep_out)} keep-outs, {targets} targets, {mission.duration_s:g} s"
         )
-        if live_cli.connects(mission, urls):
+        if real:
             sys.exit(0 if _probe(as_found(mission), urls, connect_timeout) else REFUSED)
 
 

@@ -75,7 +75,9 @@ def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
 
 
 def connects(mission: Mission, urls: Sequence[str]) -> bool:
-    """Whether real vehicles are meant.  Raises AddressError for a mission that names only some of them."""
+    """Whether real vehicles are meant.  Raises AddressError for a bad URL, or where only some vehicles have one."""
+    for url in urls:
+        parse(url)
     named = [vehicle.connect is not None for vehicle in mission.fleet]
     if not urls and any(named) and not all(named):
         raise AddressError("vehicles.connect: some vehicles have one and some have none (or give --connect)")

@@ -24,6 +24,8 @@ STANDING_M = 5.0
 """A vehicle must stand within so much of the place where the mission expects it, and of its own home."""
 HOME_HEIGHT_M = 3.0
 """Heights are told above home: it must lie within so much of the ground that the vehicle stands on."""
+MOST_ROUND_TRIP_S = 2.5
+"""A link slower than this cannot be flown over: the guard looks about three seconds ahead."""
 LEVEL_M = 3.0
 """Homes further apart in altitude than this make height layers of 6 m unsure."""
 UNKNOWN = "?"
@@ -64,7 +66,8 @@ class Inspection:
             return [Finding("autopilot", UNKNOWN, session.reason or "was not heard", True)]
         return [
             _autopilot(session, wanted),
-            _position(session),
+            _health(session),
+            _link(session),
             _battery(session, self._mission.safety.battery_return_percent),
             _home(session),
             self._place(i),
@@ -129,7 +132,16 @@ def _autopilot(session: Session, wanted: Vehicle) -> Finding:
     return Finding("autopilot", value, f"the mission wants {wanted.autopilot}" if differs else "", differs)
 
 
-def _position(session: Session) -> Finding:
+def _link(session: Session) -> Finding:
+    trip = session.round_trip_s
+    if trip is None:
+        return Finding("link", UNKNOWN, "it answers no TIMESYNC: nobody can tell whether it hears")
+    slow = trip > MOST_ROUND_TRIP_S
+    trouble = f"its link's round trip takes {trip:.1f} s, too long for setpoints" if slow else ""
+    return Finding("link", f"{1000.0 * trip:.0f} ms", trouble, slow)
+
+
+def _health(session: Session) -> Finding:
     """A position, and the firmware's own checks: a session that is READY has both."""
     if session.phase is Phase.READY:
         return Finding("health", "ready to arm")

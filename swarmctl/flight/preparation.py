@@ -72,7 +72,7 @@ class Preparation:
             return
         for i, session in enumerate(self._sessions):
             if i not in self.refusals and (reason := self._refusal(i, now)):
-                self.refusals[i] = f"vehicle {session.system} {reason}"
+                self.refusals[i] = f"vehicle {session.system}{reason}"
         if self._part is _Part.FENCING:
             self._part = _Part.DONE
             return
@@ -106,7 +106,8 @@ class Preparation:
         """Why vehicle i may not be armed, or nothing."""
         session = self._sessions[i]
         if session.phase is Phase.FAILED:
-            return f"gave up: {session.reason.removeprefix(f'vehicle {session.system}: ')}"
+            return f" gave up: {session.reason.removeprefix(f'vehicle {session.system}: ')}"
         if session.phase is not Phase.READY:
-            return f"is still {session.phase.value} at {now:.0f} s"
-        return "; ".join(finding.trouble for finding in self._inspection.vehicle(i) if finding.refuses)
+            return f" is still {session.phase.value} at {now:.0f} s"
+        troubles = [finding.trouble for finding in self._inspection.vehicle(i) if finding.refuses]
+        return f": {'; '.join(troubles)}" if troubles else ""

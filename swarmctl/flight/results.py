@@ -64,7 +64,7 @@ class Outcome:
         failed = any(self.swarm.roster.troubled) or any(
             v["outcome"] != "landed" for v in figures["per_vehicle"]
         )
-        return BROKEN if never or unsafe or failed else DONE
+        return BROKEN if never or unsafe or failed or self.swarm.broken_off else DONE
 
     def complaints(self) -> list[str]:
         """What went wrong, a line each."""

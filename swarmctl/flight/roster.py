@@ -9,11 +9,13 @@ from swarmctl.core import stages
 from swarmctl.core.world import World
 from swarmctl.vehicle.events import EventKind
 from swarmctl.vehicle.phases import FLYING, Phase
+from swarmctl.vehicle.procedures import ON_GROUND
 from swarmctl.vehicle.session import OrderError, Session
 
 EARS = ("sensor_range", "alarms_per_second", "radio_range")
 """What a vehicle that dropped out has no more."""
 LOW_M = 0.5
+NOT_OURS = (Phase.RELEASED, Phase.FAILED, Phase.LOST)
 LANDINGS_ASKED = 3
 """A vehicle that failed in the air is told to land so often; then nothing more can be done from here."""
 
@@ -69,11 +71,22 @@ class Roster:
     def drop(self, i: int, kind: EventKind) -> None:
         """Note how a vehicle was lost to the swarm.  One that failed in the air is told to land."""
         session = self._sessions[i]
-        failed = "crashed" if self._flown[i] and not session.telemetry.armed else "refused"
-        self._drop(i, {EventKind.RELEASED: "released", EventKind.LOST: "lost"}.get(kind, failed))
+        outcome = {EventKind.RELEASED: "released", EventKind.LOST: "lost"}.get(kind)
+        self._drop(i, outcome or self._how_it_failed(i))
         if kind is EventKind.FAILED and session.telemetry.armed and self._landings[i] < LANDINGS_ASKED:
             self._landings[i] += 1
             session.land()
+
+    def _how_it_failed(self, i: int) -> str:
+        """The outcome of a session that gave up."""
+        session = self._sessions[i]
+        if not self._flown[i]:
+            return "refused"
+        stands = not session.telemetry.armed or session.telemetry.landed_state == ON_GROUND
+        if stands and session.failed_while is Phase.LANDING:
+            self.troubled[i] = True  # it is down, though not as it was told
+            return "landed"
+        return "crashed" if stands else "lost"
 
     def _drop(self, i: int, outcome: str) -> None:
         self.dropped[i] = self.dropped[i] or outcome
@@ -99,12 +112,9 @@ class Roster:
                 continue  # on the ground, or no longer ours
 
     def unattended(self) -> list[int]:
-        """Rows of those in the air that nobody here flies: taken over, silent, or beyond help."""
+        """Rows of those that flew, are armed as far as is known, and that nobody here flies."""
         return [
             i
             for i, session in enumerate(self._sessions)
-            if (
-                session.phase in (Phase.RELEASED, Phase.FAILED) and session.telemetry.armed and self._flown[i]
-            )
-            or (session.phase is Phase.LOST and self.aloft(i))
+            if session.phase in NOT_OURS and session.telemetry.armed and self._flown[i]
         ]

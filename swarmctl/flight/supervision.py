@@ -1,5 +1,5 @@
-"""What no vehicle tells of itself: a battery that is only just enough, setpoints that are not flown, a way home
-that takes too long, and who is still in the air when all of ours are down.
+"""What no vehicle tells of itself: a battery that is only just enough, setpoints that are not flown, a link that is
+too slow for them, a way home that takes too long, and who is still in the air when all of ours are down.
 
 The swarm asks once a tick; what follows for the others is for the swarm to say.
 """
@@ -21,9 +21,15 @@ from .roster import Roster
 LOST_LANDING_S = 120.0
 """After all others are down: a vehicle that is still silent by then is told to land where it is."""
 WATCH_S = 300.0
-"""After all of ours are down: those of others are watched no longer."""
-TOLD_MPS, STANDS_MPS, STANDS_S = 2.0, 0.5, 10.0
-"""A vehicle that is told to fly as fast as this and stands for so long does not fly its setpoints."""
+"""After all of ours are down: one that is still silent, or beyond help, is waited for no longer."""
+RELEASED_S = 1800.0
+"""One that somebody else flies is watched until it is down, and may be retaken, but no longer than a battery lasts."""
+SLOW_ROUND_TRIP_S, SLOW_S = 2.0, 10.0
+"""A link that is slower than this, and by half a second slower than the guard counts on, for so long."""
+FLIES_MPS, STANDS_MPS, DISOBEYS_S = 2.0, 0.5, 15.0
+"""A vehicle that is told to fly and stands, or is told to stand and flies, for so long does not obey."""
+EMERGENCY_PERCENT = 5
+"""A battery so low may not last for the way home."""
 RETURN_S, RETURN_VEHICLE_S, DETOURS = 600.0, 10.0, 4.0
 """The way home may take so long, so much more a vehicle, and so many times the area's diagonal."""
 SEARCHING = (stages.SEARCH, stages.HOLD)
@@ -41,7 +47,8 @@ class Supervision:
         self._kept_percent = mission.safety.battery_return_percent
         self._world, self._sessions, self._roster, self._note = world, sessions, roster, note
         self._battery_low = [False] * len(sessions)
-        self._moved_at = np.zeros(len(sessions))
+        self._obeyed_at = np.zeros(len(sessions))
+        self._quick_at = np.zeros(len(sessions))
         self._told_to_land: set[int] = set()
         self._watched_since: float | None = None
         self._returns_since: float | None = None
@@ -61,16 +68,36 @@ class Supervision:
                 self._world.orders[i] = 1
                 self._note(i, now, "battery", f"battery at {percent} %: returns")
 
+    def exhausted(self) -> list[int]:
+        """Rows of those whose battery may give out at any moment, and that fly our setpoints."""
+        rows = []
+        for i, session in enumerate(self._sessions):
+            percent = session.telemetry.battery_percent
+            if session.phase is Phase.ENGAGED and percent is not None and percent <= EMERGENCY_PERCENT:
+                rows.append(i)
+        return rows
+
     def disobedient(self, now: float) -> list[int]:
-        """Rows of those that have stood still for a while against their setpoints; each is told once."""
+        """Rows of those that have done the contrary of their setpoints for a while; each is told once."""
         world = self._world
         told = np.hypot(world.setpoints["v_east"], world.setpoints["v_north"])
         speed = np.hypot(world.poses["v_east"], world.poses["v_north"])
         flown = np.isin(world.errands["stage"], (stages.SEARCH, stages.TRANSIT))
-        stands = flown & (told >= TOLD_MPS) & (speed < STANDS_MPS)
-        self._moved_at[~stands] = now
-        rows: list[int] = np.flatnonzero(now - self._moved_at >= STANDS_S).tolist()
-        self._moved_at[rows] = now
+        stands = (told >= FLIES_MPS) & (speed < STANDS_MPS)
+        runs = (told < STANDS_MPS) & (speed >= FLIES_MPS)
+        self._obeyed_at[~(flown & (stands | runs))] = now
+        rows: list[int] = np.flatnonzero(now - self._obeyed_at >= DISOBEYS_S).tolist()
+        self._obeyed_at[rows] = now
+        return rows
+
+    def out_of_touch(self, now: float) -> list[int]:
+        """Rows of those whose link has become slower than the guard counts on; each is told once."""
+        most = np.maximum(self._world.fleet["latency"] + 0.5, SLOW_ROUND_TRIP_S)
+        trips = np.array([s.round_trip_s or 0.0 for s in self._sessions])
+        ours = np.array([s.phase is Phase.ENGAGED for s in self._sessions])
+        self._quick_at[~ours | (trips <= most)] = now
+        rows: list[int] = np.flatnonzero(now - self._quick_at >= SLOW_S).tolist()
+        self._quick_at[rows] = now
         return rows
 
     def overdue(self, now: float) -> list[int]:
@@ -87,7 +114,8 @@ class Supervision:
         if self._watched_since is None:
             self._watched_since = now
         watched = now - self._watched_since
-        if not left or watched >= WATCH_S:
+        released = any(self._sessions[i].phase is Phase.RELEASED for i in left)
+        if not left or watched >= (RELEASED_S if released else WATCH_S):
             return False
         for i in left:
             if watched >= LOST_LANDING_S and self._sessions[i].phase is Phase.LOST:

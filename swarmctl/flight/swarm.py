@@ -13,9 +13,11 @@ What goes wrong with one vehicle in the air, and what becomes of it and of the o
 | released by order | the same | fly on |
 | silent | its firmware's failsafe; ours again when heard in our mode | as `if_one_fails` says |
 | position lost | lands where it is | as `if_one_fails` says |
-| stands still against its setpoints | lands where it is | as `if_one_fails` says |
+| does not fly its setpoints | lands where it is | as `if_one_fails` says |
+| link too slow for setpoints | lands where it is | as `if_one_fails` says |
 | does not come home in time | lands where it is | return anyway |
 | battery low | returns | fly on |
+| battery all but empty | lands where it is | as `if_one_fails` says |
 
 When all of ours are down, those that are not ours and still in the air are watched for a while: a silent one
 is told to land once its own failsafe has had time to bring it home.
@@ -78,6 +80,7 @@ class Swarm:
         self.part = Part.PREPARING
         self.search_began: float | None = None
         self.held = False
+        self.broken_off = False  #: because of what went wrong with a vehicle
         self.decisions = 0
         self.roster = Roster(world, sessions)
         self.in_range_total = 0
@@ -147,7 +150,7 @@ class Swarm:
         """Land everyone where it is, at once; when only others' vehicles are left in the air, watch them no more."""
         self._journal.event(now, 0, "land", "ordered by the operator")
         if self.part is Part.WATCHING:
-            self.part = Part.OVER
+            self._end(now)
         else:
             self.roster.land()
             self.part = Part.RETURNING
@@ -212,6 +215,7 @@ class Swarm:
     def _mind_the_others(self, why: str, now: float) -> None:
         safety = self._mission.safety
         if safety.if_one_fails == "abort" or len(self.roster.active) < safety.minimum_vehicles:
+            self.broken_off |= self.part in (Part.TAKING_OFF, Part.SEARCHING)
             self.return_all(why, now)
 
     def _welcome(self, i: int) -> None:
@@ -224,8 +228,12 @@ class Swarm:
         if self.part is Part.SEARCHING:
             self._supervision.heed_batteries(now)
         if self.part in (Part.SEARCHING, Part.RETURNING):
+            for i in self._supervision.exhausted():
+                self._bring_down(i, now, "battery all but empty: lands where it is")
             for i in self._supervision.disobedient(now):
-                self._bring_down(i, now, "stands still against its setpoints: lands where it is")
+                self._bring_down(i, now, "does not fly its setpoints: lands where it is")
+            for i in self._supervision.out_of_touch(now):
+                self._bring_down(i, now, "its link is too slow for setpoints: lands where it is")
         if self.part is Part.RETURNING:
             for i in self._supervision.overdue(now):
                 self._bring_down(i, now, "did not come home in time: lands where it is")
@@ -271,7 +279,11 @@ class Swarm:
         """None of ours is in the air: the flight is over when nobody is, or after a while."""
         if self._supervision.watch(now):
             self.part = Part.WATCHING
-            return
+        else:
+            self._end(now)
+
+    def _end(self, now: float) -> None:
+        """The flight is over; who may still be in the air is told."""
         self.part = Part.OVER
         for i in self.roster.unattended():
             self._note(

@@ -33,6 +33,7 @@ class Machine:
         self.system = system
         self.phase = Phase.CONNECTING
         self.reason = ""  #: why it FAILED or was RELEASED
+        self.failed_while: Phase | None = None  #: the phase in which it last failed
         self.telemetry = Telemetry()
         self.adapter: Adapter | None = None
         self._settings = settings.on_clock()
@@ -66,6 +67,8 @@ class Machine:
             return
         if transition.action is Action.SUSPEND:
             self._phase_when_lost = self.phase
+        elif transition.action is Action.FAIL:
+            self.failed_while = self.phase
         self._explain(signal)
         self.phase = transition.phase or self._phase_when_lost
         self._hold_due = self._now if self.phase in STREAMING else math.inf

@@ -10,9 +10,8 @@ What happens in the air, and what the session does about it:
 
 - The vehicle is silent, sends no heartbeats for longer, or answers nothing: LOST.  No setpoint is sent, so the
   firmware's own failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that
-  is not heard may hear.  When the heartbeat is back, a vehicle that was being set up is set up again from the
-  start, for it may have restarted; one that was flying has the phase that it had, and what telemetry then shows
-  decides.
+  is not heard may hear.  When the link is back, a vehicle that was being set up is set up again from the start,
+  for it may have restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
 - It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
 - It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.

@@ -13,7 +13,7 @@ from swarmctl.core import planners
 
 from .given import Swarmctl
 
-COMMANDS = ("fly", "replay", "check", "algos", "report")
+COMMANDS = ("fly", "replay", "control", "check", "algos", "report")
 
 
 def test_fly_prints_its_figures_and_where_they_are(swarmctl: Swarmctl, small: Path, tmp_path: Path) -> None:
@@ -46,6 +46,17 @@ def test_fly_obeys_its_flags(swarmctl: Swarmctl, small: Path, tmp_path: Path) ->
     written = (tmp_path / "run" / "mission.yaml").read_text()
     assert "algorithm: sweep" in written
     assert "duration_s: 12" in written
+
+
+@pytest.mark.parametrize("name", ["px4", "ardupilot"])
+def test_fly_plays_the_autopilot_asked_for(
+    swarmctl: Swarmctl, small: Path, tmp_path: Path, name: str
+) -> None:
+    flags = ("--autopilot", name, "--duration", 5, "--json", "--out", tmp_path / "run")
+    said = swarmctl("fly", "--mission", small, *flags)
+    assert {v["autopilot"] for v in json.loads(said.stdout)["per_vehicle"]} == {name}
+    written = (tmp_path / "run" / "mission.yaml").read_text()
+    assert written.count(f"autopilot: {name}") == 2  # the vehicles', and the stub's
 
 
 def test_fly_names_its_folder_by_time_and_algorithm(
