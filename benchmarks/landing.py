@@ -106,7 +106,13 @@ def come_home(world: World) -> Landing:
     not_down = int((world.errands["stage"] != stages.LANDED).sum())
     above = highest - float(world.fleet["altitude"].max())
     return Landing(
-        float(landed.max()), bound, float(landed.mean()), above, float(account[0]), float(account[1]), not_down
+        float(landed.max()),
+        bound,
+        float(landed.mean()),
+        above,
+        float(account[0]),
+        float(account[1]),
+        not_down,
     )
 
 
@@ -161,9 +167,7 @@ def main() -> int:
     given = {"vehicles.speed_mps": arguments.speed, "safety.separation_m": arguments.separation}
     print(f"{arguments.speed:g} m/s, separation {arguments.separation:g} m\n{HEADER}")
     for count in arguments.vehicles.split(","):
-        mission = load(
-            None, {**SWARM, **given, "duration_s": arguments.search, "vehicles.count": int(count)}
-        )
+        mission = load(None, {**SWARM, **given, "duration_s": arguments.search, "vehicles.count": int(count)})
         good &= fly(mission, algorithms, arguments.seeds)
     return 0 if good else 1
 
