@@ -55,7 +55,7 @@ def test_a_velocity_is_flown_from_the_first_setpoint_on(flight: Meeting, autopil
 
 
 def test_row_velocity_setpoints_are_repeated_at_20_hz(flight: Meeting) -> None:
-    """Their rate is MAVSDK's own: what is set anew goes out at once, beside the repetition."""
+    """It cannot be told another rate; but what is set anew goes out at once."""
     stub, client = flight
     client.offboard.set_velocity_ned(VelocityNedYaw(1.0, 2.0, -0.5, 90.0))
     stub.until(lambda: len(stub.received(SETPOINT)) > 20)
