@@ -58,18 +58,23 @@ class Heard(NamedTuple):
 
 
 class Link(UdpLink):
-    """The vehicle's socket, which keeps what comes."""
+    """The vehicle's socket, which keeps what comes and what goes."""
 
     def __init__(self, stub: "ServedStub", port: int, clock: Clock) -> None:
         super().__init__(stub.vehicle, (HOST, port), clock)
         self._stub = stub
-        self._decoder = Decoder()
+        self._decoder, self._decoder_of_own = Decoder(), Decoder()
 
     def datagram_received(self, data: bytes, address: tuple[str, int]) -> None:
         wall = asyncio.get_running_loop().time()
         now = self._clock.now()
         self._stub.heard += [Heard(now, wall, frame) for frame in self._decoder.feed(data)]
         super().datagram_received(data, address)
+
+    def flush(self) -> None:
+        for raw in self._vehicle.outgoing():
+            self._stub.said += self._decoder_of_own.feed(raw)
+            self._transport.sendto(raw, self._partner)
 
     def close(self) -> None:
         self._transport.close()
@@ -83,6 +88,7 @@ class ServedStub:
         self.vehicle = self.fleet.vehicles[0]
         self.truth: Any = self.fleet.truth[0]
         self.heard: list[Heard] = []
+        self.said: list[Frame] = []
         for second in range(round(-booted_s), 0):
             self.fleet.advance(float(second))
         self.vehicle.outgoing()
@@ -162,6 +168,10 @@ class ServedStub:
         """The fields of all messages of this kind that came."""
         return [heard.frame.fields for heard in self.heard if heard.frame.message_id == message_id]
 
+    def told(self, message_id: int) -> list[Any]:
+        """The fields of all messages of this kind that the vehicle sent."""
+        return [frame.fields for frame in self.said if frame.message_id == message_id]
+
     def commands(self, number: int) -> list[Any]:
         """The fields of all commands of this number that came."""
         return [
@@ -208,6 +218,11 @@ class Meeting(NamedTuple):
 
     stub: ServedStub
     client: Client
+
+    def bear_rare_setpoints(self) -> None:
+        """Have PX4 wait for them as long as ArduPilot does: ten times as fast as the wall, two come a second."""
+        if "COM_OF_LOSS_T" in self.stub.vehicle.parameters:
+            self.client.param.set_param_float("COM_OF_LOSS_T", 3.0)
 
     def take_off(self, height_m: float) -> None:
         """From the ground to hovering at a height."""

@@ -136,7 +136,7 @@ def test_row_unused_parameters_are_nan_for_px4_and_zero_for_ardupilot(meet: Meet
 @pytest.mark.parametrize("autopilot", ["px4"])
 @pytest.mark.parametrize("name", ["arm", "takeoff", "land"])
 def test_px4_refuses_before_it_is_ready(meet: Meet, name: str) -> None:
-    stub, client = meet(booted_s=0.0)
+    stub, client = meet(booted_s=0.0, speed=1.0)
     mode = stub.mode
     assert refusal(getattr(client.action, name)) is ActionResult.COMMAND_DENIED
     assert stub.now < 2.0
@@ -147,7 +147,7 @@ def test_px4_refuses_before_it_is_ready(meet: Meet, name: str) -> None:
 def test_ardupilot_refuses_to_arm_before_its_checks_and_to_take_off_before_it_has_a_position(
     meet: Meet,
 ) -> None:
-    stub, client = meet(booted_s=0.0, speed=FAST)
+    stub, client = meet(booted_s=0.0, speed=10.0)
     assert refusal(client.action.arm) is ActionResult.FAILED
     assert not stub.vehicle.armed
     stub.until(lambda: stub.now > 25.0, 40.0)

@@ -5,6 +5,7 @@ A test named for a row shows that row of "What a MAVSDK 4.1 client needs from a 
 
 import struct
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from mavsdk.plugins.geofence import Circle, FenceType, GeofenceData, Point, Polygon
@@ -21,6 +22,13 @@ from .meeting import MODES, ORIGIN, Meeting
 Meet = Callable[..., Meeting]
 CORNERS_M = ((-40.0, -40.0), (40.0, -40.0), (40.0, 30.0), (-40.0, 30.0))
 HOLE_M, HOLE_RADIUS_M = (-20.0, 0.0), 5.0
+# What each firmware asks for an item with, and what else either answers about a plan.
+REQUESTS = {"px4": mav.MAVLINK_MSG_ID_MISSION_REQUEST_INT, "ardupilot": mav.MAVLINK_MSG_ID_MISSION_REQUEST}
+ANSWERS = (
+    mav.MAVLINK_MSG_ID_MISSION_ACK,
+    mav.MAVLINK_MSG_ID_MISSION_COUNT,
+    mav.MAVLINK_MSG_ID_MISSION_ITEM_INT,
+)
 # One integer and one float of each firmware: name, what it is at first, what is written.
 INTEGERS = {"px4": ("GF_ACTION", 2, 3), "ardupilot": ("RTL_LOIT_TIME", 5000, 1234)}
 FLOATS = {"px4": ("RTL_RETURN_ALT", 30.0, 17.5), "ardupilot": ("RTL_ALT_M", 15.0, 17.5)}
@@ -36,11 +44,17 @@ def fence() -> GeofenceData:
     return GeofenceData([border], [Circle(point(*HOLE_M), HOLE_RADIUS_M, FenceType.EXCLUSION)])
 
 
+def kinds_of_plan(messages: list[Any]) -> set[int]:
+    """What the messages say they are about; there are some."""
+    assert messages
+    return {message.mission_type for message in messages}
+
+
 def degrees(points: list[Point]) -> list[float]:
     return [value for one in points for value in (one.latitude_deg, one.longitude_deg)]
 
 
-def test_row_fence_goes_up_item_by_item_and_comes_down_again(meet: Meet) -> None:
+def test_row_fence_goes_up_item_by_item_and_comes_down_again(meet: Meet, autopilot: str) -> None:
     stub, client = meet()
     client.geofence.upload_geofence(fence())
     held = stub.vehicle.fence
@@ -52,13 +66,16 @@ def test_row_fence_goes_up_item_by_item_and_comes_down_again(meet: Meet) -> None
     assert [item.command for item in items] == [mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION] * 4 + [
         mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
     ]
-    assert {fields.mission_type for fields in stub.received(mav.MAVLINK_MSG_ID_MISSION_ITEM_INT)} == {FENCE}
+    assert [asked.seq for asked in stub.told(REQUESTS[autopilot])] == [0, 1, 2, 3, 4]
+    assert [ack.type for ack in stub.told(mav.MAVLINK_MSG_ID_MISSION_ACK)] == [mav.MAV_MISSION_ACCEPTED]
     back = client.geofence.download_geofence()
     (border,), (hole,) = back.polygons, back.circles
     assert (border.fence_type, hole.fence_type) == (FenceType.INCLUSION, FenceType.EXCLUSION)
     assert degrees(border.points) == pytest.approx(degrees(fence().polygons[0].points), abs=1e-7)
     assert degrees([hole.point]) == pytest.approx(degrees([point(*HOLE_M)]), abs=1e-7)
     assert hole.radius == HOLE_RADIUS_M
+    for message_id in (REQUESTS[autopilot], *ANSWERS):
+        assert kinds_of_plan(stub.told(message_id)) == {FENCE}
     client.geofence.clear_geofence()
     assert stub.vehicle.plans.kept[FENCE] == []
     assert stub.vehicle.fence is None
@@ -80,8 +97,9 @@ def test_row_fence_rally_points_are_a_plan_of_their_own(meet: Meet) -> None:
 
 
 def test_the_fence_that_was_uploaded_stops_the_vehicle(meet: Meet, autopilot: str) -> None:
-    flight = meet()
+    flight = meet(speed=10.0)
     stub, client = flight
+    flight.bear_rare_setpoints()
     client.geofence.upload_geofence(fence())
     if autopilot == "ardupilot":
         client.param.set_param_int("FENCE_ENABLE", 1)

@@ -5,6 +5,8 @@ A test named for a row shows that row of "What a MAVSDK 4.1 client needs from a 
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
+from statistics import median
 from typing import Any
 
 import pytest
@@ -18,6 +20,8 @@ Meet = Callable[..., Meeting]
 ASKED_FOR_UNASKED = {mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION, mav.MAVLINK_MSG_ID_HOME_POSITION}
 REQUEST_MESSAGE, SET_INTERVAL = 512, 511
 POSITION: int = mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+LATE_S = 2.5
+"""By which the client may know later, streams and the wall's delays taken together."""
 LANDED_STATE: int = mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 
 
@@ -84,9 +88,8 @@ def test_row_health_comes_with_the_gps_home_and_the_prearm_check(
         return len(since) == 3
 
     stub.until(note, 60.0)
-    assert since["home"] == pytest.approx(home_s, abs=1.5)
-    assert since["armable"] == pytest.approx(armable_s, abs=1.0)
-    assert since["all"] == pytest.approx(all_ok_s, abs=1.5)
+    for name, expected_s in {"home": home_s, "armable": armable_s, "all": all_ok_s}.items():
+        assert expected_s <= since[name] < expected_s + LATE_S
 
 
 def test_row_health_goes_with_the_gps_and_comes_back(meet: Meet) -> None:
@@ -125,8 +128,7 @@ def test_row_position_and_in_air_are_what_the_vehicle_does(meet: Meet) -> None:
     flight.take_off(5.0)
     lat, lon = to_geodetic(0.0, 20.0, *ORIGIN)
     client.action.goto_location(lat, lon, ORIGIN[2] + 8.0, 0.0)
-    stub.until(lambda: stub.velocity[1] > 3.0)
-    stub.until(lambda: telemetry.velocity_ned().north_m_s > 3.0, 1.0)
+    stub.until(lambda: stub.velocity[1] > 3.0 and telemetry.velocity_ned().north_m_s > 3.0)
     stub.arrive(0.0, 20.0, 8.0)
     stub.run(1.0)
     east, north, up = stub.place
@@ -140,9 +142,12 @@ def test_row_position_and_in_air_are_what_the_vehicle_does(meet: Meet) -> None:
 
 def test_a_rate_that_is_set_is_the_rate_that_arrives(meet: Meet) -> None:
     stub, client = meet()
-    told: list[float] = []
     client.telemetry.set_rate_position(4.0)
     assert stub.vehicle.interval_us(POSITION) == 250_000
-    client.telemetry.subscribe_position(lambda *_: told.append(stub.now))
+    before = len(stub.told(POSITION))
+    arrived: list[Any] = []
+    client.telemetry.subscribe_position(lambda position, _: arrived.append(position))
     stub.run(5.0)
-    assert len(told) == pytest.approx(20, abs=1)
+    sent_ms = [message.time_boot_ms for message in stub.told(POSITION)[before:]]
+    assert median(later - earlier for earlier, later in pairwise(sent_ms)) == pytest.approx(250, abs=15)
+    stub.until(lambda: len(arrived) >= len(sent_ms), 1.0)
