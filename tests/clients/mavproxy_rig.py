@@ -124,7 +124,7 @@ class ServedFleet:
         def condition() -> bool:
             away = (body["east"] - east, body["north"] - north, body["up"] - up)
             moves = (body["v_east"], body["v_north"], body["v_up"])
-            return max(map(abs, away)) < 0.5 and max(map(abs, moves)) < 0.1
+            return bool(max(map(abs, away)) < 0.5 and max(map(abs, moves)) < 0.1)
 
         return condition
 

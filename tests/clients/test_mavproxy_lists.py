@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -28,7 +29,7 @@ def rig(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Rig]:
         yield both
 
 
-def held(fleet: ServedFleet) -> list[tuple[int, float, int, int]]:
+def held(fleet: ServedFleet) -> list[Any]:
     """The fence in the vehicle; places in 1e-7 degrees."""
     return [(item.command, item.p1, item.x, item.y) for item in fleet.fence]
 

@@ -131,7 +131,7 @@ def test_the_parameters_come_as_a_list_after_a_file_was_refused(station: Station
         if message.get_type() != "PARAM_VALUE":
             return False
         numbers.add(message.param_index)
-        return len(numbers) == message.param_count
+        return len(numbers) == int(message.param_count)
 
     station.ask(dialect.MAVLink_param_request_list_message(1, 0), complete)
     assert numbers == set(range(len(station.vehicle.parameters)))
