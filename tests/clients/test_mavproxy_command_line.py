@@ -24,7 +24,7 @@ LOCATED = "EKF_STATUS_REPORT {flags : 831"
 def mavproxy(master: str, folder: Path) -> Iterator[MavProxy]:
     client = MavProxy(master, folder)
     try:
-        client.hear("online system 1")
+        client.hear("online system")
         yield client
     finally:
         client.close()
