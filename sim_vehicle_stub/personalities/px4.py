@@ -56,7 +56,9 @@ class Px4:
     answers_any_component = False
     tells_parameter_errors = True
     shows_prearm = False
+    no_such_message: int = mav.MAV_RESULT_DENIED
     announces_origin = True
+    fence_bits = (0, 0, 0)
 
     INTERVALS_US: ClassVar[Mapping[int, int]] = {
         mav.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
@@ -64,6 +66,8 @@ class Px4:
         mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
         mav.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
         mav.MAVLINK_MSG_ID_HOME_POSITION: 1_000_000,
+        mav.MAVLINK_MSG_ID_GPS_RAW_INT: 200_000,
+        mav.MAVLINK_MSG_ID_VFR_HUD: 100_000,
         mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 20_000,
         mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 33_333,
         mav.MAVLINK_MSG_ID_ATTITUDE: 10_000,

@@ -70,7 +70,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
 
-# What the onboard link carries at 10 Hz and more without being asked, besides the position.
+# What the onboard link carries at 5 Hz and more without being asked, besides the position.
 UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_ATTITUDE,
     mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -79,6 +79,7 @@ UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
     mav.MAVLINK_MSG_ID_RC_CHANNELS,
     mav.MAVLINK_MSG_ID_VFR_HUD,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT,
     mav.MAVLINK_MSG_ID_ATTITUDE_TARGET,
     mav.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
     mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
