@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 
+from sim_vehicle_stub.personalities import px4_defaults
 from swarmctl.mavlink.codec import Decoder, Encoder
 from swarmctl.mavlink.dialect import mav
 
@@ -17,8 +18,8 @@ VEHICLES, PORT = 100, 24540
 SETTLE_S, MEASURE_S, INTERVAL_S = 8.0, 20.0, 0.1
 MASK = 1 | 2 | 32 | 64 | 128 | 256 | 2048
 POSITION = 33
-QUIET = (30, 32, 147, 242)
-INTERVALS_US = {POSITION: 100_000, 1: 500_000, 245: 500_000, **dict.fromkeys(QUIET, -1)}
+WANTED_US = {POSITION: 100_000, 1: 500_000, 245: 500_000, 0: 1_000_000}
+INTERVALS_US = {**dict.fromkeys(px4_defaults.INTERVALS_US, -1), **WANTED_US}
 
 
 def orders(encoder: Encoder, system: int) -> list[bytes]:

@@ -6,18 +6,20 @@
 from time import perf_counter
 
 from sim_vehicle_stub.fleet import StubFleet
+from sim_vehicle_stub.personalities import px4_defaults
 from sim_vehicle_stub.pilot import Limits
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
 
 VEHICLES, TICKS = 6, 16_000
+HEARTBEAT = 0
 ORIGIN = (47.3977, 8.5456, 488.0)
 MASK = 1 | 2 | 32 | 64 | 128 | 256 | 2048
 
 
 def commands_of(encoder: Encoder, system: int) -> list[bytes]:
     """Turn everything down but position at 10 Hz, switch to OFFBOARD and arm."""
-    quiet = [(message, -1) for message in (1, 30, 32, 147, 242, 245)]
+    quiet = [(message, -1) for message in px4_defaults.INTERVALS_US if message != HEARTBEAT]
     orders = [(511, message, interval) for message, interval in [*quiet, (33, 100_000)]]
     orders += [(176, 1, 6), (400, 1, 0)]
     return [

@@ -29,11 +29,21 @@ COMMAND = np.dtype(
 )
 
 # `acceleration` where the vehicle gets faster, `braking` where slower, `approach` towards a place (m/s²);
-# `speed` over the ground, `airspeed` through the air (m/s); `lag` (s) with which velocity is followed.
+# `speed` over the ground, `airspeed` through the air (m/s); `lag` (s) with which velocity is followed;
+# `share` of a commanded velocity, and of its limit, that the vehicle comes to fly.
 LIMITS = np.dtype(
     [
         (name, "<f8")
-        for name in ("speed", "airspeed", "acceleration", "braking", "approach", "climb_acceleration", "lag")
+        for name in (
+            "speed",
+            "airspeed",
+            "acceleration",
+            "braking",
+            "approach",
+            "climb_acceleration",
+            "lag",
+            "share",
+        )
     ]
 )
 
@@ -63,7 +73,10 @@ def ground_velocity(
     c_east, c_north = command["east"], command["north"]
     if command["aim"] == DRIFT:
         return wind_east, wind_north
-    if command["aim"] == PLACE:
+    if command["aim"] == VELOCITY:
+        c_east *= limits["share"]
+        c_north *= limits["share"]
+    else:
         c_east -= body["east"]
         c_north -= body["north"]
         gap = math.sqrt(c_east * c_east + c_north * c_north)
@@ -105,9 +118,10 @@ def move_one(body: Any, command: Any, limits: Any, wind_east: float, wind_north:
     v_east, v_north = body["v_east"], body["v_north"]
     slower = c_east * c_east + c_north * c_north < v_east * v_east + v_north * v_north
     change = limits["braking"] if slower else limits["acceleration"]
+    fastest = limits["speed"] * limits["share"] if command["aim"] == VELOCITY else limits["speed"]
     body["east"], body["north"], body["v_east"], body["v_north"] = horizontal(
         body["east"], body["north"], v_east, v_north,
-        c_east, c_north, limits["speed"], change, limits["lag"], dt,
+        c_east, c_north, fastest, change, limits["lag"], dt,
     )  # fmt: skip
     body["up"], body["v_up"] = vertical(
         body["up"], body["v_up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"], dt

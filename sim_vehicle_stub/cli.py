@@ -9,6 +9,7 @@ import click
 from .faults import FAULTS, parse_order
 
 if TYPE_CHECKING:
+    from .fleet import StubFleet
     from .links import Opener
 
 DEFAULT_PORT, OWN_PORT_OFFSET = 14540, 40
@@ -83,7 +84,7 @@ Over UDP a vehicle answers the first who speaks to it, and nobody else.
     type=click.IntRange(1, MOST_VEHICLES),
     default=1,
     show_default=True,
-    help=f"How many; system ids count from 1. On UDP ports of their own at most {OWN_PORT_OFFSET}.",
+    help=f"How many; system ids count from 1. With the UDP ports as given at most {OWN_PORT_OFFSET}.",
 )
 @click.option(
     "--autopilot",
@@ -110,6 +111,21 @@ Over UDP a vehicle answers the first who speaks to it, and nobody else.
     help="Vehicle i, from 0, sends to UDP port PORT+i of this machine, from PORT+40+i.",
 )
 @click.option("--shared", is_flag=True, help="All vehicles send to PORT.")
+@click.option(
+    "--ports",
+    type=click.IntRange(1, MOST_VEHICLES),
+    default=MOST_VEHICLES,
+    metavar="N",
+    help="At most N ports from PORT on: vehicles beyond share the last, as with PX4's 10.",
+)
+@click.option(
+    "--from",
+    "own_port",
+    type=click.IntRange(0, 65535 - MOST_VEHICLES),
+    metavar="PORT",
+    help="Vehicle i sends from this PORT+i (PX4's link for ground stations: --shared --port 14550 --from 18570); "
+    "0: from any free one, as ArduPilot.",
+)
 @click.option(
     "--tcp",
     type=click.IntRange(1024, 65535),
@@ -149,6 +165,8 @@ def main(
     speed: float,
     port: int,
     shared: bool,
+    ports: int,
+    own_port: int | None,
     tcp: int | None,
     pty: bool,
     home: tuple[float, float, float],
@@ -159,20 +177,19 @@ def main(
     """Play multicopters that speak MAVLink 2, until Ctrl-C."""
     if len(autopilots) not in (1, vehicles):
         raise click.UsageError(f"--autopilot names {len(autopilots)} firmwares for {vehicles} vehicles")
-    check_links(vehicles, shared, tcp, pty)
-    # Imported here, so that --help and mistakes are answered before the compiler is loaded.
+    own_port = port + OWN_PORT_OFFSET if own_port is None else own_port
+    if shared + (tcp is not None) + pty > 1:
+        raise click.UsageError("only one of --shared, --tcp and --pty can be used")
+    if tcp is not None:
+        check_tcp_ports(vehicles, tcp)
+    elif not pty:
+        check_udp_ports(vehicles, port, 1 if shared else ports, own_port)
+    # Imported here and below, so that --help and mistakes are answered before the compiler is loaded.
     from . import links
-    from .fleet import StubFleet
 
-    pads = [(SPACING_M * index, 0.0) for index in range(vehicles)]
     each = autopilots * vehicles if len(autopilots) == 1 else autopilots
-    fleet = StubFleet(vehicles, origin=home, pads_m=pads, autopilot=each, wind_mps=wind, seed=seed)
-    try:
-        for fault in faults:
-            fleet.order(parse_order(fault))
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--fault") from None
-    opener, where, first = choose_links(port, shared, tcp, pty)
+    fleet = make_fleet(each, home, wind, seed, faults)
+    opener, where, first = choose_links(port, own_port, shared, ports, tcp, pty)
     click.echo(
         f"{vehicles} {', '.join(dict.fromkeys(autopilots))} vehicle(s): {where}; Ctrl-C ends.", err=True
     )
@@ -183,7 +200,31 @@ def main(
         raise click.UsageError(f"cannot use the ports from {first} on: {error.strerror}") from None
 
 
-def choose_links(port: int, shared: bool, tcp: int | None, pty: bool) -> tuple["Opener", str, int]:
+def make_fleet(
+    autopilots: list[str],
+    home: tuple[float, float, float],
+    wind: tuple[float, float],
+    seed: int | None,
+    faults: tuple[str, ...],
+) -> "StubFleet":
+    """The vehicles, and what is to go wrong with them; raises BadParameter for a fault that cannot be."""
+    from .fleet import StubFleet
+
+    pads = [(SPACING_M * index, 0.0) for index in range(len(autopilots))]
+    fleet = StubFleet(
+        len(autopilots), origin=home, pads_m=pads, autopilot=autopilots, wind_mps=wind, seed=seed
+    )
+    try:
+        for fault in faults:
+            fleet.order(parse_order(fault))
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="--fault") from None
+    return fleet
+
+
+def choose_links(
+    port: int, own_port: int, shared: bool, ports: int, tcp: int | None, pty: bool
+) -> tuple["Opener", str, int]:
     """What opens the links, what to say of them, and the first port that they take."""
     from . import links
 
@@ -191,20 +232,24 @@ def choose_links(port: int, shared: bool, tcp: int | None, pty: bool) -> tuple["
         return links.tcp(tcp, TCP_SPACING), f"tcp ports from {tcp} on", tcp
     if pty:
         return links.pty(say_terminal), "pseudo-terminals", 0
-    own_port = port + OWN_PORT_OFFSET
-    where = f"from udp port {own_port} on, to {port}{'' if shared else ' on'}"
-    return links.udp(port, own_port, shared), where, own_port
+    own = f"udp port {own_port} on" if own_port else "any free udp port"
+    where = f"from {own}, to {port}{'' if shared else ' on'}"
+    return links.udp(port, own_port, shared, ports), where, own_port
 
 
-def check_links(vehicles: int, shared: bool, tcp: int | None, pty: bool) -> None:
-    """Raise UsageError for links that exclude each other or do not suffice."""
-    if shared + (tcp is not None) + pty > 1:
-        raise click.UsageError("only one of --shared, --tcp and --pty can be used")
-    if tcp is not None and tcp + TCP_SPACING * (vehicles - 1) > 65535:
+def check_tcp_ports(vehicles: int, tcp: int) -> None:
+    """Raise UsageError if there are not enough of them."""
+    if tcp + TCP_SPACING * (vehicles - 1) > 65535:
         raise click.UsageError(f"--tcp {tcp} leaves no ports for {vehicles} vehicles")
-    if vehicles > OWN_PORT_OFFSET and not (shared or tcp is not None or pty):
+
+
+def check_udp_ports(vehicles: int, port: int, ports: int, own_port: int) -> None:
+    """Raise UsageError if a vehicle would send from a port that one sends to."""
+    last = port + min(vehicles, ports) - 1
+    if own_port and port < own_port + vehicles and own_port <= last:
         raise click.UsageError(
-            f"--vehicles {vehicles} need --shared, --tcp or --pty: UDP has {OWN_PORT_OFFSET} ports"
+            f"--vehicles {vehicles} would send from UDP ports that others send to, from {own_port} on: "
+            "use --shared, --ports, --from, --tcp or --pty"
         )
 
 

@@ -88,7 +88,8 @@ class StubFleet:
             dice = Random(f"{seed} {index}")
             start = (dice.uniform(-START_ERROR_M, START_ERROR_M), dice.uniform(-START_ERROR_M, START_ERROR_M))
             altitude = dice.uniform(-ALTITUDE_ERROR_M, ALTITUDE_ERROR_M)
-            surroundings = Surroundings(self._origin, altitude, start, seed)
+            height = dice.uniform(-START_ERROR_M, START_ERROR_M)
+            surroundings = Surroundings(self._origin, altitude, (*start, height), seed)
         self._altitude_errors[index] = surroundings.altitude_error_m
         pilot = Pilot(self._commands, self._limits, index)
         pilot.place = tuple(self._rows[index].tolist())

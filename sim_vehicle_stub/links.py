@@ -20,6 +20,7 @@ PERIOD_S = 0.01
 """Fleet time between two ticks: the interval of the fastest stream."""
 SHORTEST_PERIOD_S = 0.002
 """Wall time between two ticks, however fast the fleet's time runs."""
+MOST_PORTS = 65535
 MOST_WAITING_BYTES = 65536
 """A client that reads no faster than this loses frames, as on a serial line."""
 
@@ -169,16 +170,21 @@ class PtyLink:
                 os.write(self._own, frame)
 
 
-def udp(port: int, own_port: int, shared: bool) -> Opener:
-    """Vehicle i sends from ``own_port`` + i to ``port`` + i on this machine, or all to ``port``."""
+def udp(port: int, own_port: int, shared: bool, ports: int = MOST_PORTS) -> Opener:
+    """Vehicle i sends from ``own_port`` + i to ``port`` + i on this machine, or all to ``port``.
+
+    ``own_port`` 0: from any port that is free.  ``ports``: how many there are to send to; vehicles beyond share
+    the last.
+    """
+    last = 0 if shared else ports - 1
 
     async def open_links(fleet: StubFleet, clock: Clock) -> list[UdpLink]:
         links = []
         for index, vehicle in enumerate(fleet.vehicles):
-            link = UdpLink(vehicle, (HOST, port if shared else port + index), clock)
+            link = UdpLink(vehicle, (HOST, port + min(index, last)), clock)
             await asyncio.get_running_loop().create_datagram_endpoint(
                 lambda link=link: link,  # type: ignore[misc]
-                (HOST, own_port + index),
+                (HOST, own_port + index if own_port else 0),
             )
             links.append(link)
         return links

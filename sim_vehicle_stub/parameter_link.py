@@ -19,13 +19,13 @@ def read(vehicle: "StubVehicle", frame: Frame) -> None:
     if name is None or name not in parameters:
         _tell_error(vehicle, frame, mav.MAV_PARAM_ERROR_DOES_NOT_EXIST)
     else:
-        _tell_value(vehicle, parameters.entry(name))
+        tell_value(vehicle, parameters.entry(name))
 
 
 def read_all(vehicle: "StubVehicle", frame: Frame) -> None:
     """PARAM_REQUEST_LIST."""
     for entry in vehicle.parameters:
-        _tell_value(vehicle, entry)
+        tell_value(vehicle, entry)
 
 
 def write(vehicle: "StubVehicle", frame: Frame) -> None:
@@ -38,10 +38,11 @@ def write(vehicle: "StubVehicle", frame: Frame) -> None:
         _tell_error(vehicle, frame, mav.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
     else:
         vehicle.personality.parameter_changed(name)
-        _tell_value(vehicle, parameters.entry(name))
+        tell_value(vehicle, parameters.entry(name))
 
 
-def _tell_value(vehicle: "StubVehicle", entry: Entry) -> None:
+def tell_value(vehicle: "StubVehicle", entry: Entry) -> None:
+    """Send a PARAM_VALUE."""
     vehicle.send_message(
         mav.MAVLink_param_value_message(
             entry.name.encode(), entry.wire_value, entry.wire_type, len(vehicle.parameters), entry.number

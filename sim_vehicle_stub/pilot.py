@@ -26,6 +26,8 @@ class Limits:
     """None: as the acceleration."""
     airspeed_mps: float | None = None
     """What it can fly through the air, for the wind; None: a quarter more than its speed."""
+    velocity_share: float = 1.0
+    """What it comes to fly of a commanded velocity: firmware may never quite make up for its drag."""
 
     @property
     def braking(self) -> float:

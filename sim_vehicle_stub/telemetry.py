@@ -5,11 +5,13 @@ A builder returns the frame, or None while the vehicle cannot know what the mess
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.dialect import CURRENT_MODE, CurrentMode, mav
+
+from . import chatter
 
 if TYPE_CHECKING:
     from .vehicle import StubVehicle
@@ -179,6 +181,22 @@ def timesync(vehicle: "StubVehicle") -> bytes:
     return vehicle.encode(mav.MAVLink_timesync_message(0, vehicle.boot_ms * 1_000_000))
 
 
+def current_mode(vehicle: "StubVehicle") -> bytes:
+    """CURRENT_MODE: the mode, which nobody intends to be another."""
+    mode = vehicle.personality.custom_mode
+    return vehicle.encode(CurrentMode(0, mode, mode))
+
+
+def _encoded(make: Callable[["StubVehicle"], Any | None]) -> Builder:
+    """The builder of the frame of a message that ``make`` makes."""
+
+    def build(vehicle: "StubVehicle") -> bytes | None:
+        message = make(vehicle)
+        return None if message is None else vehicle.encode(message)
+
+    return build
+
+
 BUILDERS: dict[int, Builder] = {
     mav.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mav.MAVLINK_MSG_ID_SYS_STATUS: sys_status,
@@ -194,4 +212,6 @@ BUILDERS: dict[int, Builder] = {
     mav.MAVLINK_MSG_ID_VFR_HUD: vfr_hud,
     mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT: ekf_status_report,
     mav.MAVLINK_MSG_ID_TIMESYNC: timesync,
+    CURRENT_MODE: current_mode,
+    **{message_id: _encoded(make) for message_id, make in chatter.MESSAGES.items()},
 }

@@ -45,13 +45,13 @@ class Surroundings:
     """What a vehicle flies in and how its sensors read it.
 
     ``origin``: latitude, longitude (degrees) and altitude (m) of the fleet's frame.  ``altitude_error_m``:
-    metres by which altitudes above sea level read too high.  ``start_error_m``: east and north from where it
-    boots to the origin of its own local frame.  ``seed``: for the network's dice.
+    metres by which altitudes above sea level read too high.  ``start_error_m``: east, north and up from where
+    it boots to the origin of its own local frame.  ``seed``: for the network's dice.
     """
 
     origin: tuple[float, float, float]
     altitude_error_m: float = 0.0
-    start_error_m: tuple[float, float] = (0.0, 0.0)
+    start_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seed: int = 0
 
 
@@ -124,9 +124,9 @@ class StubVehicle:
     def _place_of_boot(self) -> tuple[float, float, float]:
         """The origin of the local frame, where the vehicle stands now: degrees, degrees, m above sea level."""
         east, north, up = self.pilot.place[:3]
-        d_east, d_north = self._start_error_m
+        d_east, d_north, d_up = self._start_error_m
         lat, lon = to_geodetic(east + d_east, north + d_north, *self.fleet_origin)
-        return lat, lon, self.zero_amsl_m + up
+        return lat, lon, self.zero_amsl_m + up + d_up
 
     def _handlers_of_messages(self) -> dict[int, Handler]:
         """What is done with each message that has a target."""

@@ -13,6 +13,7 @@ from swarmctl.mavlink.codec import Frame
 from swarmctl.mavlink.dialect import mav
 
 from ..commands import Command
+from ..parameter_link import tell_value
 from ..parameters import C_CAST
 from ..pilot import Limits
 from ..wire import Wire
@@ -97,6 +98,7 @@ class ArduPilot:
         self._pilot.limit("climb_acceleration", limits.climb_acceleration_mps2)
         self._pilot.limit("lag", limits.lag_s)
         self._pilot.limit("airspeed", limits.airspeed)
+        self._pilot.limit("share", limits.velocity_share)
         self.values.set("MAV_SYSID", vehicle.system)
         self.parameter_changed("WP_SPD")
 
@@ -168,10 +170,7 @@ class ArduPilot:
         if vehicle.located:
             self._known = vehicle.wire
         if not self._greeted and vehicle.since_boot >= self.QUIET_FOR_S:
-            self._greeted = True
-            vehicle.say(
-                mav.MAV_SEVERITY_INFO, f"ArduCopter V{self.version >> 24}.{self.version >> 16 & 0xFF}"
-            )
+            self._greet()
         if not vehicle.armed:
             return
         if vehicle.landed and self._disarm_is_due():
@@ -179,6 +178,14 @@ class ArduPilot:
         else:
             self._failsafes.watch()
             MODES[self.mode].step(self)
+
+    def _greet(self) -> None:
+        """What it says unasked, once."""
+        self._greeted = True
+        vehicle = self.vehicle
+        vehicle.say(mav.MAV_SEVERITY_INFO, f"ArduCopter V{self.version >> 24}.{self.version >> 16 & 0xFF}")
+        for name in ardupilot_parameters.TOLD_AT_BOOT:
+            tell_value(vehicle, vehicle.parameters.entry(name))
 
     def _disarm_is_due(self) -> bool:
         """On the ground: at once where a landing was meant, else after DISARM_DELAY."""

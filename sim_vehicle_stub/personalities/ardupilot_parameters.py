@@ -32,6 +32,10 @@ OLD_NAMES = {
 }
 
 
+TOLD_AT_BOOT = ("STAT_BOOTCNT", "STAT_FLTTIME", "STAT_RUNTIME")
+"""Parameters that it tells of unasked, because it changes them itself."""
+
+
 def at_boot(limits: Limits) -> dict[str, float]:
     """The parameters of 4.8."""
     return {
@@ -53,6 +57,9 @@ def at_boot(limits: Limits) -> dict[str, float]:
         "PILOT_SPD_DN": 2.5,
         "RTL_ALT_M": 15.0,
         "RTL_LOIT_TIME": 5000,
+        "STAT_BOOTCNT": 1,
+        "STAT_FLTTIME": 0,
+        "STAT_RUNTIME": 0,
         "WP_ACC": limits.acceleration_mps2,
         "WP_SPD": limits.speed_mps,
         "WP_SPD_DN": limits.descent_mps,

@@ -1,4 +1,8 @@
-"""ArduCopter's return: up to RTL_ALT_M if lower, straight home, loiter for a moment, land."""
+"""ArduCopter's return: up to RTL_ALT_M if lower, straight home, loiter for a moment, land.
+
+Before it sets out, and again over home, it stands until it has settled.  The whole takes as long as the real
+one did, 45 to 50 s; how that was shared out was not seen.
+"""
 
 import math
 from collections.abc import Callable
@@ -8,6 +12,7 @@ if TYPE_CHECKING:
     from .ardupilot import ArduPilot
 
 ACCEPTED_M = 1.0
+SETTLES_S = 3.5
 
 
 class Return:
@@ -18,7 +23,7 @@ class Return:
         self._vehicle = autopilot.vehicle
         self._pilot = autopilot.vehicle.pilot
         self._height = 0.0
-        self._arrived_at = 0.0
+        self._stands_since = 0.0
         self._phase = 0
 
     @property
@@ -53,11 +58,15 @@ class Return:
     def _over_home(self) -> bool:
         return math.dist(self._pilot.place[:2], self._vehicle.home_place) <= ACCEPTED_M
 
-    def _loiter(self) -> None:
-        self._arrived_at = self._vehicle.now
+    def _stand(self) -> None:
+        self._stands_since = self._vehicle.now
 
-    def _loitered(self) -> bool:
-        return self._vehicle.now - self._arrived_at >= self._autopilot.values["RTL_LOIT_TIME"] / 1000.0
+    def _has_settled(self) -> bool:
+        return self._vehicle.now - self._stands_since >= SETTLES_S
+
+    def _has_loitered(self) -> bool:
+        loiter = self._autopilot.values["RTL_LOIT_TIME"] / 1000.0
+        return self._vehicle.now - self._stands_since >= SETTLES_S + loiter
 
     def _land(self) -> None:
         """The place stays home; the descent is the landing's."""
@@ -75,7 +84,8 @@ class Phase(NamedTuple):
 
 PHASES = (
     Phase(Return._climb, Return._at_height),
+    Phase(Return._stand, Return._has_settled),
     Phase(Return._fly_home, Return._over_home),
-    Phase(Return._loiter, Return._loitered),
+    Phase(Return._stand, Return._has_loitered),
     Phase(Return._land, Return._never),
 )

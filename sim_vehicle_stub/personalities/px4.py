@@ -9,11 +9,12 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from swarmctl.mavlink.codec import Frame
-from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.dialect import CURRENT_MODE, mav
 
 from ..commands import Command
 from ..parameters import BYTEWISE
 from ..pilot import Limits
+from . import px4_defaults
 from .projection import project
 from .px4_commands import ACCEPTED, COMMANDS, TEMPORARILY_REJECTED, UNSUPPORTED, Mode
 from .px4_failsafes import Failsafes
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 READY_AFTER_S = 4.5
 BOUND_LIMITS = {"MPC_XY_VEL_MAX": ("speed",), "MPC_ACC_HOR": ("acceleration", "braking", "approach")}
 """The limits of the body that a parameter sets."""
-SPOOL_UP_S = 2.0
+SPOOL_UP_S = 3.0
 AUTO_BASE_MODE: int = (
     mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     | mav.MAV_MODE_FLAG_AUTO_ENABLED
@@ -46,7 +47,7 @@ class Px4:
     version = 0x011100FF  # 1.17.0, release
     capabilities: int = mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     base_mode = AUTO_BASE_MODE
-    LIMITS = Limits()
+    LIMITS = Limits(velocity_share=0.85)
     ENCODING = BYTEWISE
     DATA_STREAMS: ClassVar[Mapping[int, tuple[int, ...]]] = {}
     LOCATED_AFTER_S, HOME_AFTER_S, QUIET_FOR_S = 2.0, 3.0, 0.0
@@ -60,46 +61,12 @@ class Px4:
     announces_origin = True
     fence_bits = (0, 0, 0)
 
-    INTERVALS_US: ClassVar[Mapping[int, int]] = {
-        mav.MAVLINK_MSG_ID_HEARTBEAT: 1_000_000,
-        mav.MAVLINK_MSG_ID_SYS_STATUS: 200_000,
-        mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 200_000,
-        mav.MAVLINK_MSG_ID_BATTERY_STATUS: 2_000_000,
-        mav.MAVLINK_MSG_ID_HOME_POSITION: 1_000_000,
-        mav.MAVLINK_MSG_ID_GPS_RAW_INT: 200_000,
-        mav.MAVLINK_MSG_ID_VFR_HUD: 100_000,
-        mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 20_000,
-        mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 33_333,
-        mav.MAVLINK_MSG_ID_ATTITUDE: 10_000,
-    }
+    INTERVALS_US: ClassVar[Mapping[int, int]] = px4_defaults.INTERVALS_US
 
     @staticmethod
     def parameters(limits: Limits) -> dict[str, float]:
         """The parameters at boot; an int is an INT32 for good, a float a REAL32."""
-        return {
-            "BAT_CRIT_THR": 0.07,
-            "BAT_EMERGEN_THR": 0.05,
-            "BAT_LOW_THR": 0.15,
-            "COM_DISARM_LAND": 2.0,
-            "COM_DISARM_PRFLT": 10.0,
-            "COM_DL_LOSS_T": 10,
-            "COM_FAIL_ACT_T": 5.0,
-            "COM_LOW_BAT_ACT": 0,
-            "COM_OF_LOSS_T": 1.0,
-            "GF_ACTION": 2,
-            "MAV_SYS_ID": 1,
-            "MIS_TAKEOFF_ALT": 2.5,
-            "MPC_ACC_HOR": limits.acceleration_mps2,
-            "MPC_LAND_SPEED": min(0.7, limits.descent_mps),
-            "MPC_TKO_SPEED": min(1.5, limits.climb_mps),
-            "MPC_XY_CRUISE": min(5.0, limits.speed_mps),
-            "MPC_XY_VEL_MAX": limits.speed_mps,
-            "MPC_Z_VEL_MAX_DN": limits.descent_mps,
-            "MPC_Z_VEL_MAX_UP": limits.climb_mps,
-            "NAV_DLL_ACT": 0,
-            "RTL_CONE_ANG": 45,
-            "RTL_RETURN_ALT": 30.0,
-        }
+        return px4_defaults.parameters(limits)
 
     @staticmethod
     def split_mode(number: int) -> tuple[float, float]:
@@ -126,6 +93,7 @@ class Px4:
         self._pilot.limit("climb_acceleration", vehicle.limits.climb_acceleration_mps2)
         self._pilot.limit("lag", vehicle.limits.lag_s)
         self._pilot.limit("airspeed", vehicle.limits.airspeed)
+        self._pilot.limit("share", vehicle.limits.velocity_share)
 
     # What telemetry tells
 
@@ -209,7 +177,10 @@ class Px4:
     # Modes
 
     def _enter(self, mode: Mode) -> None:
-        """Change the mode, and begin it if the motors run."""
+        """Change the mode, and begin it if the motors run; CURRENT_MODE tells at once, HEARTBEAT later."""
+        if mode is not self.mode and self.vehicle.interval_us(CURRENT_MODE) > 0:
+            self.mode = mode
+            self.vehicle.send(CURRENT_MODE)
         self.mode = mode
         self._step = MODES[mode].step
         if mode not in PASSING:
@@ -264,7 +235,7 @@ class Px4:
         self._setpoints.fly_last()
 
     def _step_offboard(self) -> None:
-        if self._setpoints.lost:
+        if self._setpoints.missed:
             self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Failsafe activated: no offboard signal, RTL")
             self.fail_into(Mode.RTL)
             self._resumes = True

@@ -26,6 +26,8 @@ SEA_LEVEL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
 VELOCITY_DRIFT_MPS = 0.13
 """Climb rate by which the height runs away while nothing but velocities is commanded."""
+NOTICED_S = 0.1
+"""What passes, beside the parameter, until the loss of setpoints has consequences."""
 TOLERANCE_S = 1e-6
 
 
@@ -42,7 +44,16 @@ class Setpoints:
     @property
     def lost(self) -> bool:
         """Whether the last setpoint is too old, or there was none."""
-        return self._vehicle.now - self._last_at > self._parameters["COM_OF_LOSS_T"] + TOLERANCE_S
+        return self._age > self._parameters["COM_OF_LOSS_T"] + TOLERANCE_S
+
+    @property
+    def missed(self) -> bool:
+        """Whether it has been for so long that something is done about it."""
+        return self._age > self._parameters["COM_OF_LOSS_T"] + NOTICED_S - TOLERANCE_S
+
+    @property
+    def _age(self) -> float:
+        return self._vehicle.now - self._last_at
 
     def take_local(self, setpoint: Any) -> bool:
         """Note a SET_POSITION_TARGET_LOCAL_NED; False if it cannot be used."""

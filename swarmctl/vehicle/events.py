@@ -16,6 +16,7 @@ class EventKind(Enum):
     REGAINED = "regained"  #: heartbeats again
     POSITION_LOST = "position lost"  #: heartbeats, but no valid position
     BATTERY_LOW = "battery low"  #: once a set-up
+    ASTRAY = "astray"  #: it does not fly its setpoints; once, until it does
     RESTARTED = "restarted"  #: the autopilot has booted again
     WARNING = "warning"  #: something optional did not work
     TEXT = "text"  #: STATUSTEXT of the vehicle

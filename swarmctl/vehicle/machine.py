@@ -12,7 +12,7 @@ from .autopilots.registry import ADAPTERS, adapter_for, autopilot_name
 from .commands import Ask
 from .events import Event, EventKind, TextAssembler
 from .link import Link
-from .phases import SET_UP, STREAMING, TABLE, Action, Phase, Signal
+from .phases import STREAMING, TABLE, Action, Phase, Signal
 from .preflight import Checks, Preflight
 from .settings import SessionSettings
 from .statistics import Tally
@@ -20,7 +20,7 @@ from .steps import TIME_SLACK_S, Procedure, Step
 from .telemetry import Telemetry
 from .watch import Watch
 
-# On the ground, a few heartbeats may be dropped by a bad link while everything else says that it lives.
+# A few heartbeats, of one a second, may be dropped by a bad link while everything else says that it lives.
 BEATS_LOST = 3
 
 
@@ -233,10 +233,8 @@ class Machine:
         return min(self._beat_deadline(), answered_at + self._settings.deaf_s)
 
     def _beat_deadline(self) -> float:
-        """When the vehicle has been silent for too long."""
+        """When the vehicle has been silent for too long, or has sent no heartbeat for longer."""
         silence_s = self._settings.link_loss_s
-        if self.phase not in SET_UP:
-            return self._beat_at + silence_s
         return min(self._heard_at + silence_s, self._beat_at + BEATS_LOST * silence_s)
 
     def _schedule(self) -> None:

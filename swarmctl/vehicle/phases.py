@@ -81,6 +81,7 @@ class Transition(NamedTuple):
 
 
 SET_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.CHECKING, Phase.READY)
+LOCATED = (Phase.POSITIONING, Phase.CHECKING, Phase.READY)  # on the ground, once a position has come
 STREAMING = (Phase.ENGAGING, Phase.STOPPING, Phase.RELEASING)
 AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGED, *STREAMING)
 FLYING = (*AIRBORNE, Phase.LANDING)
@@ -129,7 +130,7 @@ def _table() -> Table:
         ((*AIRBORNE, Phase.FAILED), Signal.LAND, Action.LAND, Phase.LANDING),
         (AIRBORNE, Signal.RELEASE, Action.STOP, Phase.RELEASING),
         (AIRBORNE, Signal.POSITION_LOST, Action.LAND, Phase.LANDING),
-        ((Phase.READY,), Signal.POSITION_LOST, Action.IDENTIFY, Phase.IDENTIFYING),
+        (LOCATED, Signal.POSITION_LOST, Action.IDENTIFY, Phase.IDENTIFYING),
         (SET_UP, Signal.RESTARTED, Action.IDENTIFY, Phase.IDENTIFYING),
         (FLYING, Signal.RESTARTED, Action.FAIL, Phase.FAILED),
         ((Phase.HOLDING, Phase.ENGAGED, *STREAMING), Signal.CAME_DOWN, Action.FAIL, Phase.FAILED),

@@ -86,11 +86,11 @@ def positioning(adapter: Adapter, settings: SessionSettings) -> Steps:
 
 
 def _gate(adapter: Adapter, settings: SessionSettings) -> Step:
-    """Ready to arm; what the adapter tells that by is asked for again now and then."""
-    asks = tuple(message_interval(i, hz) for i, hz in adapter.extra_rates.items())
+    """Ready to arm; the rates are asked for again now and then, for a reboot may have been missed."""
+    asks = tuple(message_interval(i, hz) for i, hz in wanted_rates(adapter, settings).items())
     pause = settings.reminder_s
     return Step(
-        "ready to arm", settings.ready_patience_s, command=Several("message rates", asks) if asks else None,
+        "ready to arm", settings.ready_patience_s, command=Several("message rates", asks),
         confirmed=lambda t: t.healthy and not t.armed, wait_s=pause, answer_s=pause, insists=True,
     )  # fmt: skip
 

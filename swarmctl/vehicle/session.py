@@ -8,14 +8,14 @@ differently is in its adapter.
 
 What happens in the air, and what the session does about it:
 
-- The vehicle's heartbeat is missing, or it answers nothing: LOST.  No setpoint is sent, so the firmware's own
-  failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that is not heard
-  may hear.  When the link is back, a vehicle that was being set up is set up again from the start, for it may
-  have restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
+- The vehicle is silent, sends no heartbeats for longer, or answers nothing: LOST.  No setpoint is sent, so the
+  firmware's own failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that
+  is not heard may hear.  When the link is back, a vehicle that was being set up is set up again from the start,
+  for it may have restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
 - It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
 - It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
-- Its battery is low: an event; what to do about it is for the caller to say.
+- Its battery is low, or it does not fly its setpoints: an event; what to do about it is for the caller to say.
 """
 
 from array import array
@@ -165,6 +165,9 @@ class Session(Machine):
             return False
         self._tally.setpoint(self._now)
         self._send_setpoint(v_east, v_north, altitude_m)
+        if self._watch.astray(v_east, v_north, self.telemetry, self._now):
+            text = f"vehicle {self.system}: it does not fly its setpoints"
+            self._report(EventKind.ASTRAY, text)
         return True
 
     def _order(self, signal: Signal) -> None:

@@ -21,12 +21,13 @@ class SessionSettings:
     setpoint_rate_hz: float = 10.0  #: hold setpoints while offboard mode is being entered
 
     heartbeat_period_s: float = 1.0  #: our own HEARTBEAT
-    link_loss_s: float = 3.0  #: without HEARTBEAT; on the ground, of silence: the link counts as lost
+    link_loss_s: float = 3.0  #: of silence, or thrice that without HEARTBEAT: the link counts as lost
     deaf_s: float = 15.0  #: without an answer to a ping, of a vehicle that did answer: it hears nothing
     ack_timeout_s: float = 0.5  #: a command without COMMAND_ACK is sent again
     attempts: int = 12  #: unanswered sendings of one command until the session gives up
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again
     retry_pause_s: float = 1.0  #: before a temporarily rejected command is sent again
+    astray_s: float = 5.0  #: setpoints not flown for so long are reported
     position_loss_s: float = 2.0  #: heartbeats without a valid position for so long: the position is lost
     battery_low_percent: float | None = None  #: at or below it, the battery is reported as low; None: never
 

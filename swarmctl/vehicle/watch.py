@@ -1,8 +1,11 @@
-"""Watches a vehicle's telemetry for what nobody tells: its position gone, its battery low, a restart.
+"""Watches a vehicle's telemetry for what nobody tells: its position gone, its battery low, setpoints not flown.
 
 The position is lost when heartbeats still come but no valid position does.  With no heartbeat either it is
-the link that is lost, which is another matter.
+the link that is lost, which is another matter.  A vehicle is astray when it flies otherwise than it is told
+and does nothing about it; one that is slow to turn or falls short of its speed is not.
 """
+
+import math
 
 from .settings import SessionSettings
 from .telemetry import Telemetry
@@ -11,6 +14,10 @@ from .telemetry import Telemetry
 RESTART_MS = 5000
 # Heartbeats since the last position: a single one may just have come first after a gap.
 BEATS_WITHOUT_POSITION = 2
+# Off what it is told by so much (m/s) and by such a part of it, a vehicle should come nearer by so much (m/s).
+ASTRAY_MPS, ASTRAY_SHARE, MENDED_MPS = 2.0, 0.5, 1.0
+# Setpoints further apart than this (s) are two streams.
+STREAM_GAP_S = 1.0
 
 
 class Watch:
@@ -24,6 +31,9 @@ class Watch:
         """Start anew: the vehicle is being set up."""
         self.streams_gone = False  #: it may have forgotten what it was asked to send
         self._low_battery_told = False
+        self._astray_told = False
+        self._told_at = self._astray_since = -math.inf
+        self._astray_from = (0.0, 0.0)
         self.forgive()
 
     def forgive(self) -> None:
@@ -47,3 +57,24 @@ class Watch:
             return False
         self._low_battery_told = True
         return True
+
+    def astray(self, v_east: float, v_north: float, telemetry: Telemetry, now: float) -> bool:
+        """Whether a vehicle that is told this velocity (m/s) has been astray for long; said once, until it obeys."""
+        flown = (telemetry.v_east, telemetry.v_north)
+        gap = math.hypot(v_east - flown[0], v_north - flown[1])
+        begins = now - self._told_at > STREAM_GAP_S / self._settings.time_scale
+        self._told_at = now
+        off = gap > max(ASTRAY_MPS, ASTRAY_SHARE * math.hypot(v_east, v_north))
+        if begins or not off or self._mends(v_east, v_north, flown, gap):
+            self._astray_told &= off
+            self._astray_since, self._astray_from = now, flown
+            return False
+        if self._astray_told or now - self._astray_since < self._settings.astray_s:
+            return False
+        self._astray_told = True
+        return True
+
+    def _mends(self, v_east: float, v_north: float, flown: tuple[float, float], gap: float) -> bool:
+        """Whether it has come nearer to what it is told now."""
+        d_east, d_north = flown[0] - self._astray_from[0], flown[1] - self._astray_from[1]
+        return d_east * (v_east - flown[0]) + d_north * (v_north - flown[1]) >= MENDED_MPS * gap

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from sim_vehicle_stub.chatter import MESSAGES
 from sim_vehicle_stub.fleet import StubFleet
 from sim_vehicle_stub.pilot import Limits
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
@@ -25,9 +26,13 @@ class Station:
         limits: Limits | None,
         tick_s: float,
         hello: bool,
+        chatter: bool,
         **others: Any,
     ) -> None:
         self.fleet = StubFleet(len(pads), origin=ORIGIN, pads_m=pads, limits=limits, **others)
+        for vehicle in () if chatter else self.fleet.vehicles:
+            for message_id in MESSAGES:
+                vehicle.set_interval(message_id, -1)
         self.vehicle = self.fleet.vehicles[0]
         self.encoder = Encoder(255, 190)
         self.decoder = Decoder()
@@ -172,15 +177,16 @@ class Station:
 
 @pytest.fixture
 def station() -> Callable[..., Station]:
-    """Make a station; one vehicle at the origin unless told otherwise."""
+    """Make a station; one vehicle at the origin unless told otherwise, its chatter turned off."""
 
     def make(
         pads: list[tuple[float, float]] | None = None,
         limits: Limits | None = None,
         tick_s: float = 0.1,
         hello: bool = True,
+        chatter: bool = False,
         **others: Any,
     ) -> Station:
-        return Station(pads or [(0.0, 0.0)], limits, tick_s, hello, **others)
+        return Station(pads or [(0.0, 0.0)], limits, tick_s, hello, chatter, **others)
 
     return make

@@ -46,19 +46,21 @@ def fly(s: Any, seconds: float, v_north: float, **others: Any) -> None:
     s.run(seconds, lambda: s.setpoint(v_north, mask=VELOCITY, **others))
 
 
-def test_row_takeoff_20_m_takes_about_ten_seconds(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-takeoff")
+def test_takeoff_20_m_takes_about_ten_seconds(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     order(s, GUIDED)
     s.arm()
     s.command(22, NAN, NAN, NAN, NAN, NAN, NAN, 20.0)
-    assert 9.0 < s.run_until(lambda: s.body["up"] > 19.0, 20.0) < 12.0
+    assert s.run_until(lambda: s.body["up"] > 19.5, 20.0) == pytest.approx(10.5, rel=0.1)
     s.run(5.0)
     assert s.body["up"] == pytest.approx(20.0, abs=0.2)
     assert s.mode == GUIDED
 
 
-def test_row_setpoints_during_takeoff_a_velocity_does_not_lift_off(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-setpoints-during-takeoff")
+def test_setpoints_during_takeoff_a_velocity_does_not_lift_off(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     order(s, GUIDED)
@@ -67,8 +69,9 @@ def test_row_setpoints_during_takeoff_a_velocity_does_not_lift_off(pilot: Make) 
     assert (s.body["up"], s.body["north"]) == (0.0, 0.0)
 
 
+@pytest.mark.row("ardupilot-setpoints-during-takeoff")
 @pytest.mark.parametrize(("after", "lowest", "highest"), [(0.5, 0.0, 0.0), (5.0, 3.0, 9.0)])
-def test_row_setpoints_during_takeoff_one_cancels_it_silently(
+def test_setpoints_during_takeoff_one_cancels_it_silently(
     pilot: Make, after: float, lowest: float, highest: float
 ) -> None:
     s = pilot()
@@ -86,19 +89,21 @@ def test_row_setpoints_during_takeoff_one_cancels_it_silently(
     assert s.mode == GUIDED
 
 
-def test_row_setpoints_stop_velocity_goes_on_for_three_seconds_then_brakes(flying: Any) -> None:
+@pytest.mark.row("ardupilot-setpoints-stop")
+def test_setpoints_stop_velocity_goes_on_for_three_seconds_then_brakes(flying: Any) -> None:
     s = flying
     fly(s, 10.0, 5.0)
+    s.setpoint(5.0, mask=VELOCITY)
     north = s.body["north"]
-    s.run(2.9)
-    assert speed_of(s) == pytest.approx(5.0, abs=0.05)
+    assert s.run_until(lambda: speed_of(s) < 4.9, 5.0) == pytest.approx(3.1, abs=0.15)
     s.run(10.0)
     assert speed_of(s) < 0.01
-    assert s.body["north"] - north == pytest.approx(21.6, abs=1.5)
+    assert s.body["north"] - north == pytest.approx(21.6, rel=0.05)
     assert s.mode == GUIDED
 
 
-def test_row_stopping_from_8_takes_16_m(flying: Any) -> None:
+@pytest.mark.row("ardupilot-stopping")
+def test_stopping_from_8_takes_16_m(flying: Any) -> None:
     s = flying
     fly(s, 15.0, 8.0)
     north = s.body["north"]
@@ -106,7 +111,8 @@ def test_row_stopping_from_8_takes_16_m(flying: Any) -> None:
     assert s.body["north"] - north == pytest.approx(16.0, abs=1.0)
 
 
-def test_row_stopping_brake_does_the_same(flying: Any) -> None:
+@pytest.mark.row("ardupilot-stopping")
+def test_stopping_brake_does_the_same(flying: Any) -> None:
     s = flying
     fly(s, 15.0, 8.0)
     north = s.body["north"]
@@ -118,8 +124,9 @@ def test_row_stopping_brake_does_the_same(flying: Any) -> None:
     assert speed_of(s) < 0.01
 
 
+@pytest.mark.row("ardupilot-stopping")
 @pytest.mark.parametrize("number", [LOITER, STABILIZE])
-def test_row_stopping_loiter_sinks_without_a_pilot(flying: Any, number: int) -> None:
+def test_stopping_loiter_sinks_without_a_pilot(flying: Any, number: int) -> None:
     s = flying
     assert order(s, number) == [0]
     s.run(4.0)
@@ -128,10 +135,11 @@ def test_row_stopping_loiter_sinks_without_a_pilot(flying: Any, number: int) -> 
     assert s.body["up"] == 0.0
 
 
-def test_row_velocity_is_limited_by_the_parameter_and_the_nose_turns_into_it(flying: Any) -> None:
+@pytest.mark.row("ardupilot-velocity-limits")
+def test_velocity_is_limited_by_the_parameter_and_the_nose_turns_into_it(flying: Any) -> None:
     s = flying
     fly(s, 10.0, 0.0, v_east=15.0)
-    assert speed_of(s) == pytest.approx(10.0, abs=0.3)
+    assert speed_of(s) == pytest.approx(10.3, rel=0.05)
     assert s.vehicle.yaw == pytest.approx(math.pi / 2)
     s.send(mav.MAVLink_param_set_message(1, 1, b"WP_SPD", 6.0, 9))
     fly(s, 10.0, 15.0)
@@ -140,14 +148,24 @@ def test_row_velocity_is_limited_by_the_parameter_and_the_nose_turns_into_it(fly
     assert s.vehicle.yaw == -1.0
 
 
+@pytest.mark.row("ardupilot-velocity-limits")
 @pytest.mark.parametrize("bit", [8, 16, 32])
-def test_row_velocity_one_ignored_axis_ignores_them_all(flying: Any, bit: int) -> None:
+def test_velocity_one_ignored_axis_ignores_them_all(flying: Any, bit: int) -> None:
     s = flying
     s.run(3.0, lambda: s.setpoint(5.0, 5.0, mask=VELOCITY | bit))
     assert speed_of(s) == 0.0
 
 
-def test_row_frames_the_mask_that_px4_likes_holds(flying: Any) -> None:
+@pytest.mark.row("ardupilot-velocity-limits")
+@pytest.mark.parametrize("bit", [1, 2, 4])
+def test_velocity_one_ignored_axis_of_a_place_ignores_the_place(flying: Any, bit: int) -> None:
+    s = flying
+    s.run(3.0, lambda: s.setpoint(z=-30.0, mask=PLACE | bit, xy=(30.0, 30.0)))
+    assert (speed_of(s), s.body["v_up"]) == (0.0, 0.0)
+
+
+@pytest.mark.row("ardupilot-frames")
+def test_frames_the_mask_that_px4_likes_holds(flying: Any) -> None:
     s = flying
     fly(s, 5.0, 5.0)
     s.run(10.0, lambda: s.setpoint(5.0, z=-30.0, mask=PX4S_MASK))
@@ -155,38 +173,43 @@ def test_row_frames_the_mask_that_px4_likes_holds(flying: Any) -> None:
     assert s.body["up"] == pytest.approx(20.0, abs=0.2)
 
 
-def test_row_frames_vertical_velocity_is_flown(flying: Any) -> None:
+@pytest.mark.row("ardupilot-frames")
+def test_frames_vertical_velocity_is_flown(flying: Any) -> None:
     s = flying
     fly(s, 4.0, 3.0, vz=-1.0)
     assert s.body["v_up"] == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.row("ardupilot-frames")
 @pytest.mark.parametrize("frame", [8, 9])
-def test_row_frames_body_turns_with_the_nose(flying: Any, frame: int) -> None:
+def test_frames_body_turns_with_the_nose(flying: Any, frame: int) -> None:
     s = flying
     fly(s, 5.0, 0.0, v_east=3.0)
     s.run(5.0, lambda: s.setpoint(4.0, mask=VELOCITY, frame=frame))
     assert (s.body["v_east"], s.body["v_north"]) == pytest.approx((4.0, 0.0), abs=0.05)
 
 
+@pytest.mark.row("ardupilot-frames")
 @pytest.mark.parametrize("frame", [2, 6, 12])
-def test_row_frames_anything_else_holds(flying: Any, frame: int) -> None:
+def test_frames_anything_else_holds(flying: Any, frame: int) -> None:
     s = flying
     fly(s, 5.0, 5.0)
     s.run(10.0, lambda: s.setpoint(5.0, mask=VELOCITY, frame=frame))
     assert speed_of(s) < 0.01
 
 
-def test_row_position_30_m_in_about_six_seconds(flying: Any) -> None:
+@pytest.mark.row("ardupilot-position-setpoints")
+def test_position_30_m_in_about_six_seconds(flying: Any) -> None:
     s = flying
     s.setpoint(z=-20.0, mask=PLACE, xy=(30.0, 0.0))
-    assert s.run_until(lambda: abs(s.body["north"] - 30.0) < 1.0, 10.0) == pytest.approx(6.5, abs=1.0)
+    assert s.run_until(lambda: abs(s.body["north"] - 30.0) < 1.0, 10.0) == pytest.approx(6.3, rel=0.1)
     s.run(10.0)
-    assert s.body["north"] == pytest.approx(30.0, abs=0.1)
+    assert s.body["north"] == pytest.approx(30.0, abs=0.08)
 
 
+@pytest.mark.row("ardupilot-frames")
 @pytest.mark.parametrize(("frame", "north"), [(1, 30.0), (7, 40.0)])
-def test_row_frames_a_place_from_the_origin_or_from_here(flying: Any, frame: int, north: float) -> None:
+def test_frames_a_place_from_the_origin_or_from_here(flying: Any, frame: int, north: float) -> None:
     s = flying
     s.setpoint(z=-20.0, mask=PLACE, xy=(10.0, 0.0))
     s.run(10.0)
@@ -234,7 +257,8 @@ def test_numbers_that_are_none_stop_it(flying: Any) -> None:
     assert s.mode == GUIDED
 
 
-def test_row_rtl_climbs_to_15_m_and_takes_its_time(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-rtl")
+def test_rtl_climbs_to_15_m_and_takes_its_time(pilot: Make) -> None:
     s = pilot()
     s.fly_guided(10.0)
     fly(s, 15.0, 5.0)
@@ -245,13 +269,14 @@ def test_row_rtl_climbs_to_15_m_and_takes_its_time(pilot: Make) -> None:
         nonlocal highest
         highest = max(highest, s.body["up"])
 
-    assert 42.0 < s.run_until(lambda: not s.vehicle.armed, 90.0, watch) < 55.0
+    assert 45.0 <= s.run_until(lambda: not s.vehicle.armed, 90.0, watch) <= 50.0
     assert highest == pytest.approx(15.0, abs=1.0)
     assert (s.body["east"], s.body["north"]) == pytest.approx((0.0, 0.0), abs=1.0)
     assert s.mode == RTL
 
 
-def test_row_rtl_land_is_slow_below_10_m(flying: Any) -> None:
+@pytest.mark.row("ardupilot-rtl")
+def test_rtl_land_is_slow_below_10_m(flying: Any) -> None:
     s = flying
     assert s.command(mav.MAV_CMD_NAV_LAND) == [0]
     s.run_until(lambda: s.body["up"] < 12.0, 20.0)
@@ -274,14 +299,16 @@ def keep_beating(s: Any, seconds: float) -> None:
     s.run(seconds, s.beat, every=1.0)
 
 
-def test_row_gcs_loss_nothing_happens_by_default(flying: Any) -> None:
+@pytest.mark.row("ardupilot-gcs-loss")
+def test_gcs_loss_nothing_happens_by_default(flying: Any) -> None:
     s = flying
     keep_beating(s, 3.0)
     s.run(30.0)
     assert s.mode == GUIDED
 
 
-def test_row_gcs_loss_with_the_parameter_it_returns_and_stays_there(flying: Any) -> None:
+@pytest.mark.row("ardupilot-gcs-loss")
+def test_gcs_loss_with_the_parameter_it_returns_and_stays_there(flying: Any) -> None:
     s = flying
     s.set_parameter("FS_GCS_ENABLE", 1)
     keep_beating(s, 5.0)
@@ -292,7 +319,8 @@ def test_row_gcs_loss_with_the_parameter_it_returns_and_stays_there(flying: Any)
     assert s.mode == RTL
 
 
-def test_row_gcs_loss_only_system_255_counts(flying: Any) -> None:
+@pytest.mark.row("ardupilot-gcs-loss")
+def test_gcs_loss_only_system_255_counts(flying: Any) -> None:
     s = flying
     s.set_parameter("FS_GCS_ENABLE", 1)
     keep_beating(s, 2.0)
@@ -301,8 +329,9 @@ def test_row_gcs_loss_only_system_255_counts(flying: Any) -> None:
     assert s.mode == RTL
 
 
+@pytest.mark.row("ardupilot-speedup")
 def test_two_speeds_of_the_same_flight_are_the_same(pilot: Make) -> None:
-    """Row "speedup": time-outs run in the vehicle's time, however coarsely it is given."""
+    """Time-outs run in the vehicle's time, however coarsely it is given."""
     ends = []
     for tick in (0.1, 0.02):
         s = pilot(tick_s=tick)

@@ -24,14 +24,17 @@ def mode(s: Any, number: int) -> list[int]:
     return results
 
 
-def test_row_streams_only_heartbeat_text_and_timesync_come_unasked(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-streams")
+def test_streams_only_heartbeat_text_timesync_and_a_few_parameters_come_unasked(pilot: Make) -> None:
     s = pilot()
     s.run(60.0)
-    assert {frame.message_id for _, frame in s.heard} == {0, 111, 253}
+    assert {frame.message_id for _, frame in s.heard} == {0, 22, 111, 253}
     assert len(s.all(0)) == 60
+    assert 0 < len(s.all(22)) < 10
 
 
-def test_row_streams_are_exact_and_lost_at_reboot(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-streams")
+def test_streams_are_exact_and_lost_at_reboot(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     assert s.command(511, 33, 200_000) == [0]
@@ -49,7 +52,8 @@ def test_row_streams_are_exact_and_lost_at_reboot(pilot: Make) -> None:
     assert s.vehicle.boot_ms < 10_000
 
 
-def test_row_streams_the_older_request_sets_groups(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-streams")
+def test_streams_the_older_request_sets_groups(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     s.send(mav.MAVLink_request_data_stream_message(1, 1, mav.MAV_DATA_STREAM_POSITION, 4, 1))
@@ -60,7 +64,8 @@ def test_row_streams_the_older_request_sets_groups(pilot: Make) -> None:
     assert len(s.all(33)) == 8
 
 
-def test_row_ready_heartbeat_home_checks_and_position_come_one_after_the_other(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-ready")
+def test_ready_heartbeat_home_checks_and_position_come_one_after_the_other(pilot: Make) -> None:
     s = pilot()
     for message in (1, 32, 33, 193, 242):
         s.command(511, message, 200_000)
@@ -79,7 +84,8 @@ def test_row_ready_heartbeat_home_checks_and_position_come_one_after_the_other(p
     assert s.last(33).lat == pytest.approx(473977000, abs=2)
 
 
-def test_row_ready_guided_needs_the_position(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-ready")
+def test_ready_guided_needs_the_position(pilot: Make) -> None:
     s = pilot()
     s.run(30.0)
     assert mode(s, GUIDED) == [0]
@@ -93,7 +99,8 @@ def test_row_ready_guided_needs_the_position(pilot: Make) -> None:
     assert s.arm() == [0]
 
 
-def test_row_ready_stabilize_arms_early_and_then_refuses_guided(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-ready")
+def test_ready_stabilize_arms_early_and_then_refuses_guided(pilot: Make) -> None:
     s = pilot()
     s.run(15.0)
     assert s.arm() == [FAILED]
@@ -104,7 +111,8 @@ def test_row_ready_stabilize_arms_early_and_then_refuses_guided(pilot: Make) -> 
     assert s.mode == STABILIZE
 
 
-def test_row_modes_have_their_numbers_and_a_wrong_one_fails(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-modes")
+def test_modes_have_their_numbers_and_a_wrong_one_fails(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     for number in (GUIDED, LOITER, RTL, LAND, BRAKE, SMART_RTL, STABILIZE):
@@ -127,7 +135,8 @@ def test_a_mode_that_flies_by_itself_cannot_be_armed_in(pilot: Make, number: int
     assert s.texts()[-1].endswith("mode not armable")
 
 
-def test_row_takeoff_disarms_itself_after_ten_seconds_without_one(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-takeoff")
+def test_takeoff_disarms_itself_after_ten_seconds_without_one(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     mode(s, GUIDED)
@@ -138,8 +147,9 @@ def test_row_takeoff_disarms_itself_after_ten_seconds_without_one(pilot: Make) -
     assert not s.vehicle.armed
 
 
+@pytest.mark.row("ardupilot-takeoff")
 @pytest.mark.parametrize(("armed", "number"), [(False, GUIDED), (True, STABILIZE)])
-def test_row_takeoff_needs_guided_and_arming(pilot: Make, armed: bool, number: int) -> None:
+def test_takeoff_needs_guided_and_arming(pilot: Make, armed: bool, number: int) -> None:
     s = pilot()
     s.run(45.0)
     mode(s, number)
@@ -148,7 +158,8 @@ def test_row_takeoff_needs_guided_and_arming(pilot: Make, armed: bool, number: i
     assert s.command(22, NAN, NAN, NAN, NAN, NAN, NAN, 10.0) == [FAILED]
 
 
-def test_row_no_answer_silence_for_another_system_answers_for_any_component(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-no-answer")
+def test_no_answer_silence_for_another_system_answers_for_any_component(pilot: Make) -> None:
     s = pilot()
     s.run(45.0)
     before = len(s.heard)
@@ -162,8 +173,9 @@ def test_row_no_answer_silence_for_another_system_answers_for_any_component(pilo
     assert s.command(31000) == [mav.MAV_RESULT_UNSUPPORTED]
 
 
+@pytest.mark.row("ardupilot-parameters")
 class TestParameters:
-    """Rows "parameters" and "integer parameters"."""
+    """New and old names, silence for others, integers as C casts them."""
 
     def read(self, s: Any, name: str) -> Any:
         before = len(s.heard)
@@ -211,7 +223,8 @@ def test_a_client_that_asks_for_the_capabilities_and_the_time_is_answered(pilot:
     assert (s.last(111).ts1, s.last(111).tc1) == (77, 2_000_000_000)
 
 
-def test_row_local_frame_is_the_vehicles_own(pilot: Make) -> None:
+@pytest.mark.row("ardupilot-local-frame")
+def test_local_frame_is_the_vehicles_own(pilot: Make) -> None:
     s = pilot(pads=[(300.0, 400.0)])
     s.command(511, 32, 100_000)
     s.run(45.0)

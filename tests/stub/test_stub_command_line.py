@@ -28,10 +28,10 @@ def bound(port: int) -> socket.socket:
 
 
 def free_base() -> int:
-    """A port P such that P, P+1, P+40 and P+41 are free now."""
+    """A port P such that the ten from P on and the twelve from P+40 on are free now."""
     for base in range(20000 + os.getpid() % 20000, 60000, 97):
         with contextlib.suppress(OSError):
-            for port in (base, base + 1, base + 40, base + 41):
+            for port in (*range(base, base + 10), *range(base + 40, base + 52)):
                 bound(port).close()
             return base
     raise AssertionError("no free ports")
@@ -66,6 +66,19 @@ def heartbeat_of(decoder: Decoder, receive: Callable[[], bytes]) -> Any:
     raise AssertionError("no heartbeat")
 
 
+def heard_from(link: socket.socket, count: int) -> dict[int, int]:
+    """System id and own port of the first ``count`` vehicles whose heartbeats come."""
+    heard: dict[int, int] = {}
+    for _ in range(100_000):
+        data, address = link.recvfrom(2048)
+        for frame in Decoder().feed(data):
+            if frame.message_id == 0:
+                heard[frame.system] = address[1]
+        if len(heard) == count:
+            return heard
+    raise AssertionError(f"only {heard}")
+
+
 @pytest.fixture
 def stub() -> Iterator[tuple[int, subprocess.Popen[str]]]:
     """Two vehicles in a process of their own."""
@@ -75,6 +88,7 @@ def stub() -> Iterator[tuple[int, subprocess.Popen[str]]]:
         yield port, process
 
 
+@pytest.mark.row("px4-links", "px4-partner-lock")
 def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subprocess.Popen[str]]) -> None:
     port, process = stub
     clients = [Client(port + index, port + 40 + index) for index in range(2)]
@@ -91,7 +105,7 @@ def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subp
     client.wait_for(33, lambda f: f.relative_alt > 4500)
     assert clients[1].wait_for(33).fields.relative_alt == 0
 
-    # Row "partner lock": a second client hears nothing, though it is obeyed.
+    # A second client hears nothing, though it is obeyed.
     other = Client(0, port + 40)
     other.send(mav.MAVLink_command_long_message(1, 1, 21, 0, nan, nan, nan, nan, nan, nan, nan))
     assert client.wait_for(77, lambda f: f.command == 21).fields.result == 0
@@ -113,6 +127,7 @@ def test_two_vehicles_take_off_by_udp_and_ctrl_c_ends_them(stub: tuple[int, subp
     [
         (["--vehicles", "0"], "--vehicles"),
         (["--vehicles", "41"], "--shared"),
+        (["--vehicles", "3", "--from", "14542"], "would send from UDP ports"),
         (["--vehicles", "251"], "--vehicles"),
         (["--autopilot", "betaflight"], "--autopilot"),
         (["--speed", "0"], "--speed"),
@@ -144,25 +159,48 @@ def test_a_port_that_is_taken_says_so() -> None:
     assert f"cannot use the ports from {port + 40} on" in result.output
 
 
+@pytest.mark.row("px4-links", "ardupilot-links")
 def test_shared_all_send_to_one_port_and_are_answered_at_their_own() -> None:
-    """Rows "links": several vehicles on one socket, told apart by their system ids."""
     port = free_base()
     client = Client(port, port + 41)
     arguments = ("--vehicles", "2", "--autopilot", "px4,ardupilot", "--port", str(port), "--shared")
     with contextlib.closing(client.link), running(*arguments, "--speed", "10"):
-        heard = {}
-        while len(heard) < 2:
-            data, address = client.link.recvfrom(2048)
-            for frame in client.decoder.feed(data):
-                if frame.message_id == 0:
-                    heard[frame.system] = (address[1], frame.fields.autopilot)
-        assert heard == {1: (port + 40, 12), 2: (port + 41, 3)}
+        assert heard_from(client.link, 2) == {1: port + 40, 2: port + 41}
         client.send(mav.MAVLink_command_long_message(2, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
         assert client.wait_for(77).system == 2
 
 
+@pytest.mark.row("px4-links")
+def test_from_the_tenth_vehicle_on_all_may_share_the_last_port() -> None:
+    port = free_base()
+    arguments = ("--vehicles", "12", "--autopilot", "ardupilot", "--port", str(port), "--ports", "10")
+    with (
+        contextlib.closing(bound(port)) as first,
+        contextlib.closing(bound(port + 9)) as last,
+        running(*arguments, "--speed", "20"),
+    ):
+        assert heard_from(first, 1) == {1: port + 40}
+        assert heard_from(last, 3) == {10: port + 49, 11: port + 50, 12: port + 51}
+
+
+@pytest.mark.row("px4-links", "ardupilot-links")
+@pytest.mark.parametrize("own", ["chosen", "any"])
+def test_where_vehicles_send_from_can_be_chosen_or_left_to_the_machine(own: str) -> None:
+    port = free_base()
+    wanted = port + 45 if own == "chosen" else 0
+    arguments = ("--vehicles", "2", "--port", str(port), "--shared", "--from", str(wanted))
+    with contextlib.closing(bound(port)) as link, running(*arguments, "--speed", "20"):
+        heard = heard_from(link, 2)
+    if wanted:
+        assert heard == {1: wanted, 2: wanted + 1}
+    else:
+        assert heard[1] != heard[2]
+        assert min(heard.values()) >= 1024
+        assert not {port + 40, port + 41} & set(heard.values())
+
+
+@pytest.mark.row("ardupilot-links")
 def test_tcp_boots_with_the_first_client_and_has_one_at_a_time() -> None:
-    """Row "links": TCP 5760, spaced by ten, blocks until a client connects."""
     port = free_base()
     arguments = ("--vehicles", "2", "--autopilot", "ardupilot", "--tcp", str(port), "--speed", "10")
     with running(*arguments) as process:

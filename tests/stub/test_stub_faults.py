@@ -153,7 +153,7 @@ def test_stuck_mode_is_acknowledged_and_not_entered(station: Make) -> None:
 
 
 def test_ignored_setpoints_count_as_a_stream_but_are_not_flown(station: Make) -> None:
-    s = station()
+    s = station(limits=Limits())
     s.fly_offboard(10.0)
     s.run(2.0, lambda: s.setpoint(3.0, z=-10.0))
     s.vehicle.faults.begin("ignored-setpoints")
@@ -291,8 +291,9 @@ class TestNetwork:
         assert s.body["up"] == pytest.approx(10.0, abs=0.2)
 
 
+@pytest.mark.row("px4-gcs-loss")
 class TestGroundStationLoss:
-    """Row "GCS loss" of PX4."""
+    """PX4's failsafe for a ground station that is not heard."""
 
     def test_arming_needs_its_heartbeats_when_it_is_wanted(self, station: Make) -> None:
         s = station(hello=False)
@@ -331,7 +332,7 @@ class TestWind:
     """A steady wind shows where it is more than the vehicle can fly against, and where nothing holds it."""
 
     def test_a_weak_one_is_flown_against(self, station: Make) -> None:
-        s = station(wind_mps=(0.0, -3.0))
+        s = station(limits=Limits(), wind_mps=(0.0, -3.0))
         s.fly_offboard(10.0)
         s.run(20.0, lambda: s.setpoint(12.0, z=-10.0))
         assert s.body["v_north"] == pytest.approx(12.0, abs=0.05)
@@ -346,8 +347,9 @@ class TestWind:
         assert s.body["v_north"] == pytest.approx(-5.0, abs=0.05)
 
 
+@pytest.mark.row("px4-origin")
 class TestScatter:
-    """Rows "origin": altitudes and local origins differ between vehicles, by a seed."""
+    """Altitudes and local origins differ between vehicles, by a seed."""
 
     PADS: ClassVar = [(20.0 * k, 0.0) for k in range(8)]
 

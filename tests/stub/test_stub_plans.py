@@ -1,6 +1,6 @@
 """The mission protocol on both firmwares: fence and rally points put in, read back, cleared; fence actions.
 
-Rows "fence" of both tables, and "fence, rally" of what a MAVSDK client needs.
+A MAVSDK client needs its row "fence, rally" of both.
 """
 
 import math
@@ -63,7 +63,8 @@ def named(s: Any, autopilot: str = "px4") -> Any:
     return s
 
 
-def test_row_fence_upload_and_download_echo_their_kind(vehicle: Any) -> None:
+@pytest.mark.row("px4-fence", "ardupilot-fence")
+def test_fence_upload_and_download_echo_their_kind(vehicle: Any) -> None:
     s = vehicle
     rows = [*box(100.0), (CIRCLE_OUT, 12.5, 30.0, 40.0)]
     assert upload(s, rows) == 0
@@ -80,7 +81,7 @@ def test_row_fence_upload_and_download_echo_their_kind(vehicle: Any) -> None:
     assert s.last(39).x == pytest.approx(item.x * 1e-7, abs=1e-5)
 
 
-def test_row_rally_points_are_kept_beside_the_fence_and_cleared_alone(vehicle: Any) -> None:
+def test_rally_points_are_kept_beside_the_fence_and_cleared_alone(vehicle: Any) -> None:
     s = vehicle
     assert upload(s, box(100.0)) == 0
     assert upload(s, [(RALLY_POINT, 0, 1.0, 2.0)], RALLY) == 0
@@ -105,8 +106,9 @@ def test_a_mission_item_in_floats_is_taken(vehicle: Any) -> None:
     assert s.last(47).type == mav.MAV_MISSION_INVALID
 
 
+@pytest.mark.row("px4-fence")
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
-def test_row_fence_frames_that_are_accepted(station: Make, frame: int) -> None:
+def test_fence_frames_that_are_accepted(station: Make, frame: int) -> None:
     assert upload(named(station()), box(50.0), frame=frame) == 0
 
 
@@ -205,8 +207,9 @@ class TestShapes:
         assert [fence.broken_at(east, 0.0) for east in (1.0, 5.0, 15.0, 25.0)] == [True, False, True, False]
 
 
+@pytest.mark.row("px4-fence")
 class TestPx4Fence:
-    """Row "fence" of PX4."""
+    """What follows a breach, by GF_ACTION."""
 
     def fly_out(self, station: Make, action: int) -> Any:
         s = named(station())
@@ -226,7 +229,7 @@ class TestPx4Fence:
         s = self.fly_out(station, 2)
         s.run(10.0, lambda: s.setpoint(3.0, z=-10.0))
         assert s.mode == LOITER
-        assert 31.0 < s.body["north"] < 34.0
+        assert s.body["north"] - 30.0 == pytest.approx(2.0, abs=1.0)
         assert s.last(0).system_status == mav.MAV_STATE_CRITICAL
         assert s.set_mode(OFFBOARD) == [0, 0]
         s.run(5.0, lambda: s.setpoint(-3.0, z=-10.0))
@@ -239,6 +242,21 @@ class TestPx4Fence:
         assert s.mode == LOITER
         assert s.run_until(lambda: s.mode == RTL, 10.0) == pytest.approx(4.0, abs=0.5)
 
+    @pytest.mark.parametrize(
+        "zone",
+        [
+            [(EXCLUDE, 4, east, 60.0 + north) for _, _, east, north in box(30.0)],
+            [(CIRCLE_OUT, 30.0, 0.0, 60.0)],
+        ],
+        ids=["polygon", "circle"],
+    )
+    def test_a_zone_to_keep_out_of_is_a_fence_too(self, station: Make, zone: list[Row]) -> None:
+        s = named(station())
+        assert upload(s, [*box(90.0), *zone]) == 0
+        s.fly_offboard(10.0)
+        s.run_until(lambda: s.mode == LOITER, 30.0, lambda: s.setpoint(3.0, z=-10.0))
+        assert s.body["north"] == pytest.approx(30.0, abs=0.5)
+
     def test_arming_outside_is_accepted(self, station: Make) -> None:
         s = named(station(pads=[(50.0, 0.0)]))
         upload(s, box(30.0))
@@ -246,8 +264,9 @@ class TestPx4Fence:
         assert s.mode == LOITER
 
 
+@pytest.mark.row("ardupilot-fence")
 class TestArduPilotFence:
-    """Row "fence" of ArduPilot."""
+    """Throttled short of it, or what follows a breach."""
 
     def flying(self, station: Make, **parameters: float) -> Any:
         s = named(station(autopilot="ardupilot"), "ardupilot")

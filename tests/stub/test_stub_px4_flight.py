@@ -28,13 +28,14 @@ def speed_of(s: Any) -> float:
     return math.hypot(s.body["v_east"], s.body["v_north"])
 
 
-def test_row_takeoff_is_above_sea_level_and_takes_about_twelve_seconds_to_10_m(station: Make) -> None:
+@pytest.mark.row("px4-takeoff")
+def test_takeoff_is_above_sea_level_and_takes_about_twelve_seconds_to_10_m(station: Make) -> None:
     s = station()
     s.run(5.0)
     assert take_off(s, 498.0) == [0]
     assert (s.mode, s.body["up"]) == (TAKEOFF, 0.0)
     assert s.arm() == [0]
-    assert 7.0 < s.run_until(lambda: s.body["up"] > 9.5, 20.0) < 14.0
+    assert s.run_until(lambda: s.body["up"] > 9.9, 20.0) == pytest.approx(12.0, rel=0.1)
     s.run(5.0)
     assert s.mode == LOITER
     assert s.body["up"] == pytest.approx(10.0, abs=0.1)
@@ -44,7 +45,8 @@ def test_row_takeoff_is_above_sea_level_and_takes_about_twelve_seconds_to_10_m(s
     assert s.last(33).relative_alt == pytest.approx(10000, abs=100)
 
 
-def test_row_takeoff_a_relative_altitude_means_below_the_ground(station: Make) -> None:
+@pytest.mark.row("px4-takeoff")
+def test_takeoff_a_relative_altitude_means_below_the_ground(station: Make) -> None:
     s = station()
     s.run(5.0)
     frame = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -56,7 +58,18 @@ def test_row_takeoff_a_relative_altitude_means_below_the_ground(station: Make) -
     assert not s.vehicle.armed
 
 
-def test_row_takeoff_without_an_altitude_uses_the_parameter(station: Make) -> None:
+@pytest.mark.row("px4-takeoff")
+def test_takeoff_a_relative_altitude_of_a_reposition_in_the_air_lands_it(station: Make) -> None:
+    s = station()
+    s.fly_up(10.0)
+    frame, none = mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, 0x7FFFFFFF
+    s.send(mav.MAVLink_command_int_message(1, 1, frame, 192, 0, 0, -1, 1, NAN, NAN, none, none, 6.0))
+    s.run_until(lambda: not s.vehicle.armed, 30.0)
+    assert s.body["up"] == 0.0
+
+
+@pytest.mark.row("px4-takeoff")
+def test_takeoff_without_an_altitude_uses_the_parameter(station: Make) -> None:
     s = station()
     s.run(5.0)
     s.send(mav.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 5.0, 9))
@@ -75,17 +88,19 @@ def test_takeoff_tells_its_landed_state_on_the_way(station: Make) -> None:
     assert s.last(245).landed_state == mav.MAV_LANDED_STATE_TAKEOFF
 
 
-def test_row_offboard_needs_a_stream_in_the_air(station: Make) -> None:
+@pytest.mark.row("px4-offboard")
+def test_offboard_needs_a_stream_in_the_air(station: Make) -> None:
     s = station()
     s.fly_up(10.0)
     assert s.set_mode(OFFBOARD) == [0, REJECTED]
     assert s.mode == LOITER
 
 
+@pytest.mark.row("px4-offboard")
 @pytest.mark.parametrize(
     ("old_s", "results", "mode"), [(0.0, [0, 0], OFFBOARD), (1.5, [0, REJECTED], LOITER)]
 )
-def test_row_offboard_one_setpoint_is_enough_while_it_is_fresh(
+def test_offboard_one_setpoint_is_enough_while_it_is_fresh(
     station: Make, old_s: float, results: list[int], mode: int
 ) -> None:
     s = station()
@@ -96,18 +111,20 @@ def test_row_offboard_one_setpoint_is_enough_while_it_is_fresh(
     assert s.mode == mode
 
 
-def test_row_setpoints_stop_brings_it_home_after_a_second(station: Make) -> None:
-    s = station()
+@pytest.mark.row("px4-setpoints-stop")
+def test_setpoints_stop_brings_it_home_after_a_second(station: Make) -> None:
+    s = station(tick_s=0.01)
     s.fly_offboard(10.0)
     s.run(1.0, lambda: s.setpoint(3.0, z=-10.0))
-    lost = s.run_until(lambda: s.mode == RTL, 3.0)
-    assert 0.9 < lost < 1.2
+    s.setpoint(3.0, z=-10.0)
+    assert s.run_until(lambda: s.mode == RTL, 3.0) == pytest.approx(1.15, abs=0.06)
     s.run(1.0)
     assert s.last(0).system_status == mav.MAV_STATE_CRITICAL
 
 
+@pytest.mark.row("px4-setpoints-stop")
 @pytest.mark.parametrize(("rate", "modes"), [(1.1, {OFFBOARD}), (0.9, {OFFBOARD, RTL})])
-def test_row_setpoints_stop_a_slow_stream_holds_or_flaps(station: Make, rate: float, modes: set[int]) -> None:
+def test_setpoints_stop_a_slow_stream_holds_or_flaps(station: Make, rate: float, modes: set[int]) -> None:
     s = station(tick_s=0.01)
     s.fly_offboard(10.0)
     seen = set()
@@ -122,8 +139,9 @@ def test_row_setpoints_stop_a_slow_stream_holds_or_flaps(station: Make, rate: fl
     assert seen == modes
 
 
-def test_row_setpoints_stop_and_resume_silently(station: Make) -> None:
-    s = station()
+@pytest.mark.row("px4-setpoints-stop")
+def test_setpoints_stop_and_resume_silently(station: Make) -> None:
+    s = station(tick_s=0.045)
     s.fly_offboard(10.0)
     s.run(1.5)
     assert s.mode == RTL
@@ -143,22 +161,36 @@ def test_a_mode_chosen_by_the_pilot_is_not_taken_back_by_the_stream(station: Mak
     assert s.mode == RTL
 
 
-def test_row_velocity_pure_velocity_drifts_in_height_and_z_holds_it(station: Make) -> None:
+@pytest.mark.row("px4-velocity")
+def test_velocity_pure_velocity_drifts_in_height_and_z_holds_it(station: Make) -> None:
     s = station()
     s.fly_offboard(10.0)
     s.run(10.0, lambda: s.setpoint(2.0, mask=PURE_VELOCITY))
-    assert 0.8 < abs(s.body["up"] - 10.0) < 1.8
+    assert s.body["up"] - 10.0 == pytest.approx(1.3, abs=0.1)
     s.run(10.0, lambda: s.setpoint(2.0, z=-10.0))
     assert s.body["up"] == pytest.approx(10.0, abs=0.3)
     s.run(3.0, lambda: s.setpoint(mask=PURE_VELOCITY, vz=-1.0))
     assert s.body["v_up"] == pytest.approx(1.13, abs=0.01)
 
 
-def test_row_velocity_takes_time_and_is_limited_by_the_parameter(station: Make) -> None:
+@pytest.mark.row("px4-velocity")
+@pytest.mark.parametrize(
+    ("commanded", "after", "reached"), [(5.0, 1.0, 3.0), (5.0, 10.0, 4.4), (30.0, 6.0, 9.7)]
+)
+def test_velocity_takes_time_and_is_never_quite_reached(
+    station: Make, commanded: float, after: float, reached: float
+) -> None:
+    """Within 6 %: the real one falls short by a growing part, the stub by the same part at any speed."""
     s = station()
     s.fly_offboard(10.0)
-    s.run(1.0, lambda: s.setpoint(5.0, z=-10.0))
-    assert 2.0 < speed_of(s) < 4.0
+    s.run(after, lambda: s.setpoint(commanded, z=-10.0))
+    assert speed_of(s) == pytest.approx(reached, rel=0.06)
+
+
+@pytest.mark.row("px4-velocity")
+def test_velocity_is_limited_by_the_parameter(station: Make) -> None:
+    s = station(limits=Limits())
+    s.fly_offboard(10.0)
     s.run(10.0, lambda: s.setpoint(30.0, z=-10.0))
     assert speed_of(s) == pytest.approx(12.0, abs=0.1)
     s.send(mav.MAVLink_param_set_message(1, 1, b"MPC_XY_VEL_MAX", 8.0, 9))
@@ -182,8 +214,9 @@ def test_acceleration_and_climb_stay_within_the_vehicles_limits(station: Make) -
     assert fastest_up == pytest.approx(6.0)
 
 
-def test_row_frames_body_turns_with_the_nose(station: Make) -> None:
-    s = station()
+@pytest.mark.row("px4-frames")
+def test_frames_body_turns_with_the_nose(station: Make) -> None:
+    s = station(limits=Limits())
     s.fly_offboard(10.0)
     mask = PURE_VELOCITY & ~1024
     s.run(3.0, lambda: s.setpoint(4.0, mask=mask, frame=8, yaw=math.pi / 2))
@@ -194,8 +227,9 @@ def test_row_frames_body_turns_with_the_nose(station: Make) -> None:
     assert s.last(30).yaw == pytest.approx(math.pi / 2)
 
 
+@pytest.mark.row("px4-frames")
 @pytest.mark.parametrize("frame", [9, 12])
-def test_row_frames_others_are_complained_of_and_are_no_stream(station: Make, frame: int) -> None:
+def test_frames_others_are_complained_of_and_are_no_stream(station: Make, frame: int) -> None:
     s = station()
     s.fly_offboard(10.0)
     s.setpoint(z=-10.0)
@@ -218,7 +252,8 @@ def send_global(
     )
 
 
-def test_row_frames_global_place_with_relative_altitude(station: Make) -> None:
+@pytest.mark.row("px4-frames")
+def test_frames_global_place_with_relative_altitude(station: Make) -> None:
     s = station()
     s.fly_offboard(10.0)
     s.run(30.0, lambda: send_global(s, 40.0, -30.0, 15.0))
@@ -261,7 +296,8 @@ def test_loiter_brakes_and_stays(station: Make) -> None:
     assert s.body["north"] == pytest.approx(held, abs=0.05)
 
 
-def test_row_takeoff_reposition_is_above_sea_level_too(station: Make) -> None:
+@pytest.mark.row("px4-takeoff")
+def test_takeoff_reposition_is_above_sea_level_too(station: Make) -> None:
     s = station()
     s.fly_up(10.0)
     lat, lon = to_geodetic(30.0, 20.0, *ORIGIN)
@@ -279,7 +315,8 @@ def test_row_takeoff_reposition_is_above_sea_level_too(station: Make) -> None:
     assert s.body["up"] == pytest.approx(20.0, abs=0.3)
 
 
-def test_row_in_the_air_disarm_needs_force(station: Make) -> None:
+@pytest.mark.row("px4-in-the-air")
+def test_in_the_air_disarm_needs_force(station: Make) -> None:
     s = station()
     s.fly_up(10.0)
     assert s.command(400, 0) == [REJECTED]

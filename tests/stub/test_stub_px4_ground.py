@@ -16,15 +16,18 @@ from swarmctl.mavlink.dialect import mav
 Make = Callable[..., Any]
 
 
-def test_row_rates_streams_run_unasked(station: Make) -> None:
-    s = station(tick_s=0.01)
-    s.run(5.0)
+@pytest.mark.row("px4-rates")
+def test_rates_404_messages_a_second_run_unasked(station: Make) -> None:
+    s = station(tick_s=0.01, chatter=True)
+    s.run(8.0)
     counts = Counter(frame.message_id for time, frame in s.heard if time > 4.0)
-    assert (counts[30], counts[33], counts[1], counts[0]) == (100, 50, 5, 1)
-    assert counts[32] in (30, 31)
+    assert (counts[30], counts[33], counts[1], counts[0]) == (400, 200, 20, 4)
+    assert counts[32] == pytest.approx(120, abs=1)
+    assert counts.total() / 4.0 == pytest.approx(404.0, rel=0.01)
 
 
-def test_row_rates_an_interval_is_kept_to_the_tick(station: Make) -> None:
+@pytest.mark.row("px4-rates")
+def test_rates_an_interval_is_kept_to_the_tick(station: Make) -> None:
     s = station()
     s.run(3.0)
     assert s.command(511, 33, 100_000) == [0]
@@ -39,12 +42,14 @@ def test_row_rates_an_interval_is_kept_to_the_tick(station: Make) -> None:
     assert [time for time, _ in s.all(30) if time > 13.0]
 
 
+@pytest.mark.row("px4-rates")
 @pytest.mark.parametrize("message_id", [65000.0, math.nan, 33.5])
-def test_row_rates_an_interval_for_what_does_not_exist_fails(station: Make, message_id: float) -> None:
+def test_rates_an_interval_for_what_does_not_exist_fails(station: Make, message_id: float) -> None:
     assert station().command(511, message_id, 100_000) == [mav.MAV_RESULT_FAILED]
 
 
-def test_row_statustext_comes_only_after_a_ground_station_was_heard(station: Make) -> None:
+@pytest.mark.row("px4-statustext")
+def test_statustext_comes_only_after_a_ground_station_was_heard(station: Make) -> None:
     s = station(hello=False)
     s.arm()
     assert s.texts() == []
@@ -56,7 +61,8 @@ def test_row_statustext_comes_only_after_a_ground_station_was_heard(station: Mak
     assert s.texts()
 
 
-def test_row_statustext_is_cut_into_chunks_that_end_in_a_tab(station: Make) -> None:
+@pytest.mark.row("px4-statustext")
+def test_statustext_is_cut_into_chunks_that_end_in_a_tab(station: Make) -> None:
     s = station()
     s.vehicle.say(6, "x" * 70)
     s.vehicle.say(6, "short")
@@ -65,7 +71,8 @@ def test_row_statustext_is_cut_into_chunks_that_end_in_a_tab(station: Make) -> N
     assert chunks == [("x" * 50, 1, 0), ("x" * 20 + "\t", 1, 1), ("short\t", 0, 0)]
 
 
-def test_row_origin_is_told_once_and_on_request(station: Make) -> None:
+@pytest.mark.row("px4-origin")
+def test_origin_is_told_once_and_on_request(station: Make) -> None:
     s = station(pads=[(300.0, 400.0)])
     assert s.command(512, 49) == [mav.MAV_RESULT_DENIED]
     s.run(20.0)
@@ -77,7 +84,8 @@ def test_row_origin_is_told_once_and_on_request(station: Make) -> None:
     assert origin.altitude == 488000
 
 
-def test_row_origin_home_lies_on_the_grid_of_float32(station: Make) -> None:
+@pytest.mark.row("px4-origin")
+def test_origin_home_lies_on_the_grid_of_float32(station: Make) -> None:
     s = station(pads=[(300.0, 400.0)])
     s.run(4.0)
     home = s.last(242)
@@ -94,17 +102,19 @@ def test_before_the_fix_no_position_is_told(station: Make) -> None:
     assert not s.last(1).onboard_control_sensors_health & mav.MAV_SYS_STATUS_SENSOR_GPS
 
 
-def test_row_projection_is_spherical_and_2_m_off_at_1_km(station: Make) -> None:
+@pytest.mark.row("px4-projection")
+@pytest.mark.parametrize(("metres", "off"), [(100.0, 0.2), (1000.0, 2.1)])
+def test_projection_is_spherical_and_2_m_off_at_1_km(station: Make, metres: float, off: float) -> None:
     s = station()
     s.run(3.0)
-    for metres, low, high in ((100.0, 0.1, 0.4), (1000.0, 1.5, 3.5)):
-        s.fleet.truth["east"][0] = metres
-        s.tick()
-        assert low < abs(s.last(32).y - metres) < high
-        assert s.last(32).x == pytest.approx(0.0, abs=0.1)
+    s.fleet.truth["east"][0] = s.fleet.truth["north"][0] = metres / math.sqrt(2.0)
+    s.tick()
+    place = math.hypot(s.last(32).x - s.body["north"], s.last(32).y - s.body["east"])
+    assert place == pytest.approx(off, abs=0.05)
 
 
-def test_row_mode_numbers(station: Make) -> None:
+@pytest.mark.row("px4-mode-numbers")
+def test_mode_numbers(station: Make) -> None:
     s = station()
     s.fly_offboard(10.0)
     for mode in (0x60000, 0x3040000, 0x6040000, 0x5040000):
@@ -115,7 +125,8 @@ def test_row_mode_numbers(station: Make) -> None:
         assert s.last(0).base_mode & 1
 
 
-def test_row_mode_change_is_acknowledged_twice_and_the_second_tells_the_truth(station: Make) -> None:
+@pytest.mark.row("px4-mode-change")
+def test_mode_change_is_acknowledged_twice_and_the_second_tells_the_truth(station: Make) -> None:
     s = station()
     assert s.set_mode(0x5040000) == [0, mav.MAV_RESULT_TEMPORARILY_REJECTED]
     s.run(5.0)
@@ -124,7 +135,22 @@ def test_row_mode_change_is_acknowledged_twice_and_the_second_tells_the_truth(st
     assert s.command(176, 1, math.nan, math.nan) == [0, mav.MAV_RESULT_DENIED]
 
 
-def test_row_ready_to_arm_some_seconds_after_boot(station: Make) -> None:
+@pytest.mark.row("px4-mode-change")
+def test_mode_change_is_told_at_once_by_current_mode_and_within_a_second_by_heartbeat(station: Make) -> None:
+    s = station()
+    s.run(5.25)
+    beats, told = len(s.all(0)), len(s.all(436))
+    assert s.set_mode(0x60000) == [0, 0]
+    assert [f.custom_mode for _, f in s.all(436)[told:]] == [0x60000]
+    assert len(s.all(0)) == beats
+    s.run(1.0)
+    assert [f.custom_mode for _, f in s.all(0)[beats:]] == [0x60000]
+    assert s.command(512, 436) == [0]
+    assert s.last(436).intended_custom_mode == 0x60000
+
+
+@pytest.mark.row("px4-ready")
+def test_ready_to_arm_some_seconds_after_boot(station: Make) -> None:
     s = station()
     s.run(4.3)
     assert s.arm() == [mav.MAV_RESULT_TEMPORARILY_REJECTED]
@@ -139,7 +165,8 @@ def test_row_ready_to_arm_some_seconds_after_boot(station: Make) -> None:
     assert s.last(0).system_status == mav.MAV_STATE_ACTIVE
 
 
-def test_row_ready_to_arm_disarms_itself_without_takeoff(station: Make) -> None:
+@pytest.mark.row("px4-ready")
+def test_ready_to_arm_disarms_itself_without_takeoff(station: Make) -> None:
     s = station()
     s.run(5.0)
     s.arm()
@@ -149,7 +176,8 @@ def test_row_ready_to_arm_disarms_itself_without_takeoff(station: Make) -> None:
     assert not s.vehicle.armed
 
 
-def test_row_offboard_is_accepted_disarmed_without_a_stream_but_not_arming(station: Make) -> None:
+@pytest.mark.row("px4-offboard")
+def test_offboard_is_accepted_disarmed_without_a_stream_but_not_arming(station: Make) -> None:
     s = station()
     s.run(5.0)
     assert s.set_mode(0x60000) == [0, 0]
@@ -159,7 +187,7 @@ def test_row_offboard_is_accepted_disarmed_without_a_stream_but_not_arming(stati
     assert s.arm() == [0]
 
 
-def test_row_no_answer_for_another_system_and_none_to_setpoints(station: Make) -> None:
+def test_no_answer_for_another_system_and_none_to_setpoints(station: Make) -> None:
     s = station()
     s.run(5.0)
     before = len(s.heard)
@@ -194,7 +222,7 @@ def test_garbage_and_a_lone_zero_message_change_nothing(station: Make) -> None:
 
 
 class TestParameters:
-    """Row "integer parameters": bytewise; row "an unknown parameter": PARAM_ERROR at once."""
+    """Integers cross bytewise; an unknown name is answered with PARAM_ERROR at once."""
 
     def ask(self, s: Any, name: bytes, index: int = -1) -> Any:
         before = len(s.heard)

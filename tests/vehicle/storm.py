@@ -11,6 +11,9 @@ from typing import Any
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import OrderError, Session
 
+LAST_BREAK_S = 150.0
+"""By then a flight that goes well is over."""
+
 
 @dataclass(frozen=True)
 class Weather:
@@ -23,6 +26,20 @@ class Weather:
     crumbs: bool = False  # byte by byte
     dead_up_from: float = math.inf
     dead_down_from: float = math.inf
+
+
+def drawn(seed: int) -> Weather:
+    """Any weather: each trouble more or less or not at all, and now and then a direction that falls silent."""
+    dice = random.Random(seed)
+    return Weather(
+        loss=dice.uniform(0.0, 0.4),
+        repeat=dice.choice((0.0, dice.uniform(0.0, 0.3))),
+        delay_s=dice.choice((0.0, dice.uniform(0.0, 2.0))),
+        garbage=dice.choice((0.0, dice.uniform(0.0, 0.3))),
+        crumbs=dice.random() < 0.3,
+        dead_up_from=dice.uniform(0.0, LAST_BREAK_S) if dice.random() < 0.15 else math.inf,
+        dead_down_from=dice.uniform(0.0, LAST_BREAK_S) if dice.random() < 0.15 else math.inf,
+    )
 
 
 class StormyLink:
@@ -84,9 +101,9 @@ class Captain:
     def _land(self) -> None:
         if self._session.adapter is None or self.landings == 3:
             return
-        self.landings += 1
         with contextlib.suppress(OrderError):
             self._session.land()
+            self.landings += 1
 
 
 def fly(
@@ -98,8 +115,9 @@ def fly(
     seed: int,
     limit_s: float,
     tick_s: float = 0.1,
+    over: Callable[[float], bool] = lambda now: False,
 ) -> float:
-    """Fly through ``weather`` until the vehicle has landed, or ``limit_s``; returns when that was."""
+    """Fly through ``weather`` until the vehicle has landed, or it is ``over``, or ``limit_s``; when that was."""
     down = StormyLink(weather, weather.dead_down_from, seed)
     up = StormyLink(weather, weather.dead_up_from, seed + 1)
     captain = Captain(session, 10.0)
@@ -112,6 +130,6 @@ def fly(
         captain.command(now)
         for data in up.carry(session.outgoing(), now):
             receive(data, now)
-        if session.phase is Phase.LANDED:
+        if session.phase is Phase.LANDED or over(now):
             break
     return now

@@ -58,6 +58,11 @@ def disarm(rig: Any) -> None:
 
 
 def blind(rig: Any) -> None:
+    """The position goes; on the ground, what comes next does not come meanwhile."""
+    if rig.session.phase is Phase.POSITIONING:
+        rig.vehicle.healthy = False
+        rig.until(lambda: rig.session.telemetry.positioned)
+    rig.vehicle.memory.receive = lambda message_id, fields: None
     rig.vehicle.fixed = False
     rig.vehicle.deaf.add(mav.MAV_CMD_DO_SET_MODE)
     rig.run(5.0)

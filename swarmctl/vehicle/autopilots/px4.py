@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from swarmctl.mavlink.codec import Encoder
-from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.dialect import CURRENT_MODE, mav
 from swarmctl.vehicle.commands import (
     AUTOPILOT_COMPONENT,
     CUSTOM_MODE_ENABLED,
@@ -70,7 +70,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
 
-# What the onboard link carries at 5 Hz and more without being asked, besides the position.
+# What the onboard link carries often, or at every change of mode, without being asked.
 UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_ATTITUDE,
     mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -86,6 +86,8 @@ UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_HIGHRES_IMU,
     mav.MAVLINK_MSG_ID_ALTITUDE,
     mav.MAVLINK_MSG_ID_ODOMETRY,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT,
+    CURRENT_MODE,
 )
 
 PREARM_CHECK: int = mav.MAV_SYS_STATUS_PREARM_CHECK
@@ -107,8 +109,21 @@ class Px4:
     needs_origin = True
 
     def prepare(self, settings: SessionSettings) -> tuple[Step, ...]:
-        """Nothing: PX4 gets ready in any mode."""
-        return ()
+        """Out of OFFBOARD, but never of a vehicle that somebody has armed.
+
+        PX4 falls back to it after a flight; without setpoints it then never says that it is ready.
+        """
+        patience = settings.ready_patience_s
+        return (
+            Step("standing disarmed", patience, confirmed=lambda t: not t.armed),
+            Step(
+                "loiter mode",
+                patience,
+                command=self.set_mode(MODES.parked),
+                confirmed=lambda t: t.mode != MODES.engaged,
+                insists=True,
+            ),
+        )
 
     def set_mode(self, mode: int) -> Command:
         """DO_SET_MODE takes the main and the sub mode apart."""
