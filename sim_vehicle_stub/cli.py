@@ -62,7 +62,23 @@ def parse_wind(context: click.Context, option: click.Parameter, text: str) -> tu
     return east, north
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+GROUND_STATIONS = """
+\b
+Point a ground station at it:
+  QGroundControl finds vehicles at UDP port 14550 by itself:
+    sim-vehicle-stub --shared --port 14550
+  MAVProxy, over each kind of link:
+    sim-vehicle-stub --shared --port 14550   mavproxy.py --master=udpin:127.0.0.1:14550
+    sim-vehicle-stub --tcp 5760              mavproxy.py --master=tcp:127.0.0.1:5760
+    sim-vehicle-stub --pty                   mavproxy.py --master=/dev/pts/N,57600
+
+\b
+ArduPilot needs 41 s after boot until it can be armed in GUIDED, PX4 5 s.
+Over UDP a vehicle answers the first who speaks to it, and nobody else.
+"""
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]}, epilog=GROUND_STATIONS)
 @click.option(
     "--vehicles",
     type=click.IntRange(1, MOST_VEHICLES),

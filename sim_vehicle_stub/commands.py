@@ -79,10 +79,7 @@ def set_message_interval(vehicle: "StubVehicle", command: Command) -> int:
 
 def request_message(vehicle: "StubVehicle", command: Command) -> int:
     """MAV_CMD_REQUEST_MESSAGE: the answer's MAV_RESULT."""
-    message_id = whole(command.p1)
-    if message_id is None or not vehicle.send(message_id):
-        return int(mav.MAV_RESULT_DENIED)
-    return int(mav.MAV_RESULT_ACCEPTED)
+    return _tell(vehicle, whole(command.p1))
 
 
 def get_message_interval(vehicle: "StubVehicle", command: Command) -> int:
@@ -97,8 +94,18 @@ def get_message_interval(vehicle: "StubVehicle", command: Command) -> int:
 
 def tell_version(vehicle: "StubVehicle", command: Command) -> int:
     """MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, the older way to ask for AUTOPILOT_VERSION."""
-    vehicle.send(mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-    return int(mav.MAV_RESULT_ACCEPTED)
+    return _tell(vehicle, mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+
+
+def tell_home(vehicle: "StubVehicle", command: Command) -> int:
+    """MAV_CMD_GET_HOME_POSITION, the older way to ask for HOME_POSITION."""
+    return _tell(vehicle, mav.MAVLINK_MSG_ID_HOME_POSITION)
+
+
+def _tell(vehicle: "StubVehicle", message_id: int | None) -> int:
+    """Send a message that was asked for: the answer's MAV_RESULT."""
+    sent = message_id is not None and vehicle.send(message_id)
+    return int(mav.MAV_RESULT_ACCEPTED) if sent else vehicle.personality.no_such_message
 
 
 LINK_COMMANDS: dict[int, Any] = {
@@ -106,4 +113,5 @@ LINK_COMMANDS: dict[int, Any] = {
     mav.MAV_CMD_GET_MESSAGE_INTERVAL: get_message_interval,
     mav.MAV_CMD_REQUEST_MESSAGE: request_message,
     mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: tell_version,
+    mav.MAV_CMD_GET_HOME_POSITION: tell_home,
 }

@@ -57,13 +57,15 @@ def heartbeat(vehicle: "StubVehicle") -> bytes:
 def sys_status(vehicle: "StubVehicle") -> bytes:
     """SYS_STATUS; PX4 sets the pre-arm bit in the health alone."""
     percent = vehicle.battery.percent
-    health = SENSORS if vehicle.fixed else SENSORS & ~mav.MAV_SYS_STATUS_SENSOR_GPS
+    present, enabled, healthy = vehicle.personality.fence_bits
+    shown = SENSORS | PREARM if vehicle.personality.shows_prearm else SENSORS
+    health = healthy | (SENSORS if vehicle.fixed else SENSORS & ~mav.MAV_SYS_STATUS_SENSOR_GPS)
     if vehicle.personality.ready:
         health |= PREARM
-    shown = SENSORS | PREARM if vehicle.personality.shows_prearm else SENSORS
     return vehicle.encoder.sys_status(
-        shown, shown, health, 300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0
-    )
+        shown | present, shown | enabled, health,
+        300, _battery_mv(percent), -1, int(percent), 0, 0, 0, 0, 0, 0,
+    )  # fmt: skip
 
 
 def _battery_mv(percent: float) -> int:

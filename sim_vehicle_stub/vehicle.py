@@ -15,7 +15,7 @@ from swarmctl.core.calls import to_geodetic
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
 
-from . import commands, parameter_link, telemetry
+from . import commands, file_transfer, parameter_link, telemetry
 from .battery import Battery
 from .faults import Faults
 from .fences import Fence, fence_of
@@ -140,6 +140,7 @@ class StubVehicle:
             mav.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: partial(parameter_link.read_all, self),
             mav.MAVLINK_MSG_ID_PARAM_SET: partial(parameter_link.write, self),
             mav.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._request_data_stream,
+            mav.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: partial(file_transfer.answer, self),
             mav.MAVLINK_MSG_ID_MISSION_COUNT: plans.count,
             mav.MAVLINK_MSG_ID_MISSION_ITEM: plans.item,
             mav.MAVLINK_MSG_ID_MISSION_ITEM_INT: plans.item_int,

@@ -65,6 +65,7 @@ class ArduPilot:
     answers_any_component = True
     tells_parameter_errors = False
     shows_prearm = True
+    no_such_message: int = FAILED
     announces_origin = False
     OLD_NAMES = False
 
@@ -135,6 +136,14 @@ class ArduPilot:
     def ready(self) -> bool:
         """Whether the pre-arm checks of the present mode pass."""
         return self._refusal() is None
+
+    @property
+    def fence_bits(self) -> tuple[int, int, int]:
+        """A fence that is switched off, or only reports, is present; it is healthy until it is broken."""
+        values, bit = self.values, int(mav.MAV_SYS_STATUS_GEOFENCE)
+        present = bit if values["FENCE_TYPE"] else 0
+        enabled = present if values["FENCE_ENABLE"] and values["FENCE_ACTION"] else 0
+        return present, enabled, 0 if self._failsafes.outside_fence else bit
 
     def unsure_position(self) -> Wire:
         """Zero latitude and longitude before the first fix; the last known ones without an estimate."""

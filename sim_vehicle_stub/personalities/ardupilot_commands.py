@@ -17,7 +17,7 @@ ACCEPTED: int = mav.MAV_RESULT_ACCEPTED
 DENIED: int = mav.MAV_RESULT_DENIED
 UNSUPPORTED: int = mav.MAV_RESULT_UNSUPPORTED
 FAILED: int = mav.MAV_RESULT_FAILED
-FORCE = 21196
+FORCE_ARMING, FORCE_DISARMING = 2989, 21196
 """Second parameter of an arming or disarming that asks no questions."""
 SEA_LEVEL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
@@ -90,8 +90,8 @@ def arm_or_disarm(autopilot: "ArduPilot", command: Command) -> int:
     if wanted == vehicle.armed:
         return ACCEPTED
     if wanted:
-        return autopilot.arm(force=command.p2 == FORCE)
-    if not vehicle.landed and command.p2 != FORCE:
+        return autopilot.arm(force=command.p2 == FORCE_ARMING)
+    if not vehicle.landed and command.p2 != FORCE_DISARMING:
         return FAILED
     vehicle.disarm()
     return ACCEPTED

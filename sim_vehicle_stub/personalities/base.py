@@ -41,6 +41,8 @@ class Personality(Protocol):
     tells_parameter_errors: bool
     shows_prearm: bool
     """Whether SYS_STATUS has the pre-arm check among the sensors present and enabled."""
+    no_such_message: int
+    """MAV_RESULT of a request for a message that it does not have, or not yet."""
     announces_origin: bool
     """Whether GPS_GLOBAL_ORIGIN is sent, once, when the position is found."""
 
@@ -73,6 +75,10 @@ class Personality(Protocol):
     @property
     def ready(self) -> bool:
         """Whether it could be armed, as SYS_STATUS tells."""
+
+    @property
+    def fence_bits(self) -> tuple[int, int, int]:
+        """MAV_SYS_STATUS_GEOFENCE or 0, as SYS_STATUS tells the fence: present, enabled, healthy."""
 
     def unsure_position(self) -> Wire | None:
         """GLOBAL_POSITION_INT from `lat` to `vz` while the position is not known; None: not sent."""

@@ -57,7 +57,9 @@ class Px4:
     answers_any_component = False
     tells_parameter_errors = True
     shows_prearm = False
+    no_such_message: int = mav.MAV_RESULT_DENIED
     announces_origin = True
+    fence_bits = (0, 0, 0)
 
     INTERVALS_US: ClassVar[Mapping[int, int]] = px4_defaults.INTERVALS_US
 
@@ -120,10 +122,10 @@ class Px4:
 
     @property
     def ready(self) -> bool:
-        """Whether it could be armed: a while after boot, and in OFFBOARD only with a stream."""
+        """Whether it could be armed: a while after boot, and in OFFBOARD only with setpoints."""
         return (
             self.vehicle.since_boot >= READY_AFTER_S
-            and (self.mode is not Mode.OFFBOARD or self._setpoints.streaming)
+            and (self.mode is not Mode.OFFBOARD or not self._setpoints.lost)
             and self.vehicle.located
             and "arming-refused" not in self.vehicle.faults.active
             and not self._failsafes.misses_ground_station
@@ -275,7 +277,7 @@ class Px4:
             return TEMPORARILY_REJECTED
         if self.vehicle.armed and not self.vehicle.located and mode is not Mode.LAND:
             return TEMPORARILY_REJECTED
-        if mode is Mode.OFFBOARD and self.vehicle.armed and not self._setpoints.streaming:
+        if mode is Mode.OFFBOARD and self.vehicle.armed and self._setpoints.lost:
             self.vehicle.say(
                 mav.MAV_SEVERITY_CRITICAL, "Switching to mode 'Offboard' is currently not possible"
             )

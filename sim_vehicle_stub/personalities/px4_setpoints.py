@@ -1,7 +1,9 @@
-"""How PX4 reads setpoints: per axis, whatever the mask leaves; and when it calls them a stream.
+"""How PX4 reads setpoints: per axis, whatever the mask leaves; and when it misses them.
 
 Horizontally a place goes before a velocity, vertically a height before a climb rate; what is left out is
-held.  Messages in a frame that PX4 does not know are complained of, one text each, and are no stream.
+held.  OFFBOARD asks for nothing but that the last setpoint is younger than COM_OF_LOSS_T: one is enough to
+switch, if the command comes soon.  Messages in a frame that PX4 does not know are complained of, one text
+each, and count for nothing.
 """
 
 import math
@@ -22,8 +24,6 @@ BODY_NED: int = mav.MAV_FRAME_BODY_NED
 RELATIVE_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL_RELATIVE_ALT, mav.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT})
 SEA_LEVEL_FRAMES = frozenset({mav.MAV_FRAME_GLOBAL, mav.MAV_FRAME_GLOBAL_INT})
 
-STREAM_FOR_S = 0.2
-"""A stream that has lasted so long is good enough to switch to OFFBOARD."""
 VELOCITY_DRIFT_MPS = 0.13
 """Climb rate by which the height runs away while nothing but velocities is commanded."""
 NOTICED_S = 0.1
@@ -40,11 +40,10 @@ class Setpoints:
         self._last: Any = None
         self._fly: Callable[[Any], None] = self._fly_local
         self._last_at = -math.inf
-        self._since = -math.inf
 
     @property
     def lost(self) -> bool:
-        """Whether the last setpoint is too old."""
+        """Whether the last setpoint is too old, or there was none."""
         return self._age > self._parameters["COM_OF_LOSS_T"] + TOLERANCE_S
 
     @property
@@ -55,11 +54,6 @@ class Setpoints:
     @property
     def _age(self) -> float:
         return self._vehicle.now - self._last_at
-
-    @property
-    def streaming(self) -> bool:
-        """Whether there has been a stream for long enough, and still is."""
-        return not self.lost and self._last_at - self._since >= STREAM_FOR_S - TOLERANCE_S
 
     def take_local(self, setpoint: Any) -> bool:
         """Note a SET_POSITION_TARGET_LOCAL_NED; False if it cannot be used."""
@@ -86,8 +80,6 @@ class Setpoints:
         self._vehicle.say(mav.MAV_SEVERITY_ERROR, f"{message} coordinate frame {frame} unsupported")
 
     def _note(self, setpoint: Any, fly: Callable[[Any], None]) -> None:
-        if self.lost:
-            self._since = self._vehicle.now
         self._last_at = self._vehicle.now
         self._last, self._fly = setpoint, fly
 

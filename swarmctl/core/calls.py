@@ -3,7 +3,7 @@
 Calling a kernel of the other modules directly would compile it anew in every process.
 """
 
-from . import geodesy, randoms, scene, steering, wire
+from . import geodesy, homing, randoms, scene, steering, wire
 from .bind import compiled
 
 to_local = compiled(geodesy.to_local)
@@ -12,6 +12,6 @@ uniform = compiled(randoms.uniform)
 place_centres = compiled(scene.place_centres)
 lay_out = compiled(scene.lay_out)
 sort_into = compiled(scene.sort_into)
-begin_return = compiled(steering.begin_return)
+order_home = compiled(homing.order_home)
 steer = compiled(steering.steer)
 read_poses = compiled(wire.read_poses)

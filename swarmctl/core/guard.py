@@ -139,12 +139,23 @@ def _ahead_distance(paths: Records, a: int, b: int) -> float:
 
 
 @kernel
+def _here_distance(paths: Records, a: int, b: int) -> float:
+    """Squared distance (m²) of where vehicle ``a`` is from all of path ``b``."""
+    x, y = paths[a].east_0, paths[a].north_0
+    return min(
+        fence.point_to_segment(x, y, paths[b].east_0, paths[b].north_0, paths[b].east_1, paths[b].north_1),
+        fence.point_to_segment(x, y, paths[b].east_1, paths[b].north_1, paths[b].east_2, paths[b].north_2),
+    )
+
+
+@kernel
 def _apart(paths: Records, i: int, row: int, separation: float, gain: float) -> bool:
     """Whether candidate ``paths[row]`` of vehicle ``i`` keeps clear of every other vehicle's path.
 
     Where the path vehicle ``i`` owns is already nearer than that (rounding, wind, two launched so), the candidate
     must lead apart by ``gain`` metres in the coming interval.  Not coming nearer would not do: what rounding
-    hides, a millimetre a tick, would add up.
+    hides, a millimetre a tick, would add up.  So would the chord of the turn under way, which runs nearer to one
+    whom the vehicle flies round than the turn itself: it does not count.
     """
     wanted = separation + SEPARATION_MARGIN_M
     for j in range(paths.shape[0] - 1):
@@ -157,7 +168,7 @@ def _apart(paths: Records, i: int, row: int, separation: float, gain: float) -> 
             continue
         if path_distance(paths, row, j) >= wanted * wanted:
             continue
-        owned = math.sqrt(path_distance(paths, i, j))
+        owned = math.sqrt(min(_here_distance(paths, i, j), _ahead_distance(paths, i, j)))
         if owned >= wanted or math.sqrt(_ahead_distance(paths, row, j)) < owned + gain:
             return False
     return True

@@ -14,7 +14,7 @@ Arrays have one row a vehicle:
 
 from typing import TYPE_CHECKING
 
-from . import know, radio, sense, stages, steering
+from . import homing, know, radio, sense, stages, steering
 from .arrays import Flags, Floats, Integers, Records
 
 if TYPE_CHECKING:
@@ -153,9 +153,7 @@ def run_multicopter(
                 in_range[tick, i] = knowledge[i].in_range
         if begun >= 0 and ahead == in_range.shape[0] * per_period:
             orders[:] = 1
-            steering.begin_return(
-                fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges
-            )
+            homing.order_home(fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges)
         steering.steer(
             fleet, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, paths, wants,
             sent, setpoints,

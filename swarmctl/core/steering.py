@@ -3,7 +3,7 @@
 import math
 
 from . import fence, guard, homing, motion, stages
-from .arrays import Floats, Integers, Records
+from .arrays import Floats, Records
 from .jit import kernel
 
 
@@ -17,21 +17,7 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
         return float(poses[i].up)
     if stage < stages.WAIT:
         return float(fleet[i].altitude)
-    return 0.0 if stage >= stages.DESCEND else float(errands[i].layer)
-
-
-@kernel
-def begin_return(
-    fleet: Records, poses: Records, errands: Records, orders: Integers, now: float, rules: Records,
-    plan_edges: Floats, guard_edges: Floats,
-) -> None:  # fmt: skip
-    """Send home every vehicle with a one in ``orders`` (V,)."""
-    for i in range(orders.shape[0]):
-        if orders[i] != 0:
-            homing.order_home(fleet, poses, errands, i, now, plan_edges, guard_edges)
-    for i in range(orders.shape[0]):
-        if orders[i] != 0:
-            errands[i].layer = homing.choose_layer(fleet, poses, errands, i, rules[0].separation)
+    return 0.0 if stage == stages.LAND else float(errands[i].layer)
 
 
 @kernel

@@ -133,7 +133,7 @@ class World:
 
     def begin_return(self, now: float) -> None:
         """Send home every vehicle with a one in ``orders``, and clear them."""
-        calls.begin_return(
+        calls.order_home(
             self.fleet, self.poses, self.errands, self.orders, now, self.rules, self.fences.plan,
             self.fences.guard,
         )  # fmt: skip

@@ -204,3 +204,12 @@ def test_a_column_with_room_to_brake_is_not_slowed() -> None:
     for _ in range(100):
         flight.step([(10.0, 0.0)] * 3)
         assert flight.outcomes == ["kept"] * 3
+
+
+@pytest.mark.parametrize(("start", "goal"), [((60.0, 10.0), (-30.0, 0.0)), ((60.0, 0.0), (-26.0, -5.0))])
+def test_round_one_that_stands_it_keeps_clear_though_its_setpoints_act_late(
+    start: Place, goal: Place
+) -> None:
+    flight = Flight([(0.0, 0.0), start], WIDE, separation=25.0, speed=12.0, latency=0.5)
+    flight.fly(300, lambda f: toward([(0.0, 0.0), goal], 12.0, f))
+    assert math.dist(flight.places[1], goal) < 2.0

@@ -1,4 +1,4 @@
-"""The way home: every vehicle to its own pad, round what is forbidden, in its own layer, in turn; whole missions."""
+"""The way home: every vehicle to its own pad, round what is forbidden, in few layers, in turn; whole missions."""
 
 import itertools
 import math
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from swarmctl.core import bind, homing, stages, steering
+from swarmctl.core import bind, stages, steering, timetable
 from swarmctl.core.world import Fences, World
 
 from .worlds import Box, Place, edges_of, fences, fleet_of, region, rules_of, world_of
@@ -29,10 +29,11 @@ class Return:
     """Vehicles ordered home from ``places``, hovering at 50 m, in still air."""
 
     def __init__(
-        self, places: Sequence[Place], fence: Fences, pads: Sequence[Place] = PADS, speed: float = 12.0
-    ) -> None:
+        self, places: Sequence[Place], fence: Fences, pads: Sequence[Place] = PADS, speed: float = 12.0,
+        separation: float = 15.0,
+    ) -> None:  # fmt: skip
         fleet = fleet_of(pads[: len(places)], speed=speed)
-        self.world: World = world_of("bounce", fleet, rules_of(), fence)
+        self.world: World = world_of("bounce", fleet, rules_of(separation=separation), fence)
         self.world.poses["east"], self.world.poses["north"] = np.transpose(places)
         self.world.poses["up"] = 50.0
         self.world.errands["stage"] = stages.SEARCH
@@ -56,9 +57,18 @@ class Return:
             for i, stage in enumerate(w.errands["stage"]):
                 self.times.setdefault((i, int(stage)), self.tick * 0.1)
             self.tick += 1
-            if (w.errands["stage"] == stages.LANDED).all():
+            if np.isin(w.errands["stage"], (stages.LANDED, stages.ADRIFT)).all():
                 break
         return self
+
+    @property
+    def seconds(self) -> float:
+        """How long it has been flown."""
+        return self.tick * 0.1
+
+    def place(self, i: int) -> Place:
+        """Where vehicle ``i`` is."""
+        return float(self.world.poses["east"][i]), float(self.world.poses["north"][i])
 
     def order_only(self, i: int) -> "Return":
         """Let all others search on, standing where they are, as if only vehicle ``i`` had been ordered home."""
@@ -75,7 +85,7 @@ class Return:
         assert off.max() < 1.0
         assert (w.poses["up"] < 0.05).all()
         assert self.account[1] == 0.0
-        assert self.account[0] >= 15.0
+        assert self.account[0] >= float(w.rules[0]["separation"])
 
 
 move, watch = bind.compiled(steering.move), bind.compiled(steering.watch)
@@ -114,16 +124,148 @@ def test_from_round_an_inner_corner() -> None:
     flight.fly().check()
 
 
-def test_ways_that_meet_lie_six_metres_apart_in_height() -> None:
-    world = Return(SPREAD, fences(AREA, KEEP_OUTS, 20.0)).world
-    ways, layers = routes(world), world.errands["layer"]
-    met = 0
-    for i, j in itertools.combinations(range(6), 2):
-        if ways[i].distance(ways[j]) < 15.0 + homing.MEETING_MARGIN_M:
-            met += 1
-            assert abs(layers[i] - layers[j]) >= 6.0
-    assert met >= 10
-    assert layers.min() == 50.0  # the lowest is the search height
+def spread(count: int, seed: int, area: Box = AREA) -> list[Place]:
+    """Places at least 16 m apart, drawn from an area."""
+    rng = np.random.default_rng(seed)
+    west, east, south, north = area
+    places: list[Place] = []
+    while len(places) < count:
+        place = float(rng.uniform(west + 20.0, east - 20.0)), float(rng.uniform(south + 20.0, north - 20.0))
+        if all(math.dist(place, other) >= 16.0 for other in places):
+            places.append(place)
+    return places
+
+
+def grid(count: int, spacing: float = 20.0) -> list[Place]:
+    """A square grid of pads, row by row."""
+    columns = math.ceil(math.sqrt(count))
+    return [(25.0 + spacing * (k % columns), 25.0 + spacing * (k // columns)) for k in range(count)]
+
+
+@pytest.mark.parametrize(("count", "seed"), [(6, 1), (6, 2), (30, 3), (60, 4)])
+def test_by_plan_nobody_comes_near_another_in_one_layer(count: int, seed: int) -> None:
+    world = Return(spread(count, seed), fences(AREA, (), 20.0), grid(count)).world
+    ways, layers, released = routes(world), world.errands["layer"], world.errands["release_at"]
+    under_way = np.array([[r <= t <= r + w.length / 12.0 for t in range(200)]
+                          for w, r in zip(ways, released, strict=True)])  # fmt: skip
+    places = np.array([shapely.get_coordinates(w.interpolate(12.0 * (np.arange(200) - r)))
+                       for w, r in zip(ways, released, strict=True)])  # fmt: skip
+    shared = 0
+    for i, j in itertools.combinations(range(count), 2):
+        if abs(layers[i] - layers[j]) < 6.0:
+            shared += 1
+            apart = np.hypot(*(places[i] - places[j]).T)
+            assert apart[under_way[i] & under_way[j]].min(initial=math.inf) >= 15.0
+    assert shared > 0
+
+
+def test_layers_are_few_and_begin_at_the_search_height() -> None:
+    layers = Return(spread(60, 1), fences(AREA, (), 20.0), grid(60)).world.errands["layer"]
+    assert set(layers) == {50.0 + timetable.LAYER_M * k for k in range(timetable.LAYERS)}
+
+
+def test_nobody_climbs_far_above_the_layers() -> None:
+    flight = Return(spread(60, 1), fences(AREA, (), 20.0), grid(60))
+    highest = 0.0
+    while (flight.world.errands["stage"] != stages.LANDED).any() and flight.seconds < 300.0:
+        flight.fly(0.1)
+        highest = max(highest, float(flight.world.poses["up"].max()))
+    flight.check()
+    assert highest < 50.0 + timetable.LAYER_M * (timetable.LAYERS + 1) + 1.0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_hundred_are_down_in_three_minutes(seed: int) -> None:
+    area = (0.0, 1000.0, 0.0, 1000.0)
+    flight = Return(spread(100, seed, area), fences(area, (), 20.0), grid(100))
+    flight.fly().check()
+    assert flight.seconds < 165.0  # the farthest alone takes 140 s from 50 m
+
+
+@pytest.mark.parametrize(("count", "separation"), [(30, 25.0), (41, 15.0), (100, 15.0)])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_no_crowd_over_the_pads_blocks_itself(count: int, separation: float, seed: int) -> None:
+    """Everybody hovers over another one's pad, with hardly room to pass between two of them."""
+    pads = grid(count, separation + 1.0)
+    places = [pads[k] for k in np.random.default_rng(seed).permutation(count)]
+    flight = Return(places, fences(AREA, (), 20.0), pads, separation=separation)
+    flight.fly(400.0).check()
+
+
+def test_of_two_that_bar_each_others_way_one_climbs() -> None:
+    pads = [(60.0, 300.0), (740.0, 300.0)]
+    corridor = fences(
+        (0.0, 800.0, 270.0, 330.0), (), 20.0
+    )  # 40 m between the guard's fences: no room to pass
+    flight = Return([(450.0, 300.0), (350.0, 300.0)], corridor, pads, separation=45.0)
+    world = flight.world
+    world.errands["layer"], world.errands["release_at"] = 50.0, 0.0
+    highest = [0.0, 0.0]
+    while (world.errands["stage"] != stages.LANDED).any() and flight.seconds < 200.0:
+        flight.fly(0.1)
+        highest = [max(h, float(up)) for h, up in zip(highest, world.poses["up"], strict=True)]
+    assert (world.errands["stage"] == stages.LANDED).all()
+    assert flight.account[0] >= 45.0
+    assert min(highest) < 51.0 < max(highest)
+
+
+def adrift_at(flight: Return, i: int, place: Place, up: float) -> None:
+    """Vehicle ``i`` is no longer ours and hovers at a place."""
+    world = flight.world
+    world.errands["stage"][i] = stages.ADRIFT
+    world.poses["east"][i], world.poses["north"][i], world.poses["up"][i] = *place, up
+
+
+@pytest.mark.parametrize("up", [50.0, 30.0, 4.0])
+def test_where_somebody_adrift_stands_over_its_pad_it_lands_beside(up: float) -> None:
+    flight = Return(SPREAD, fences(AREA, KEEP_OUTS, 20.0))
+    adrift_at(flight, 5, PADS[0], up)
+    flight.fly(400.0)
+    assert flight.world.errands["stage"].tolist() == [stages.LANDED] * 5 + [stages.ADRIFT]
+    beside = flight.place(0)
+    assert 15.0 < math.dist(beside, PADS[0]) < 60.0
+    assert all(math.dist(beside, pad) > 15.0 for pad in PADS[1:])
+    assert all(math.dist(flight.place(i), PADS[i]) < 1.0 for i in range(1, 5))
+    assert flight.account[0] >= 15.0
+
+
+def stacked() -> Return:
+    """Vehicle 1 waits in the very corner to climb from 50 to 62 m; vehicle 0 hovers over its pad, above it, at 56 m."""
+    flight = Return([(20.0, 20.0), (12.0, 12.0)], fences(AREA, (), 20.0), [(20.0, 20.0), (700.0, 500.0)])
+    world = flight.world
+    world.poses["up"] = 56.0, 50.0
+    world.errands["stage"] = stages.OVER_PAD, stages.WAIT
+    world.errands["layer"] = 56.0, 62.0
+    world.errands["wait_up"] = 50.0
+    world.errands["release_at"] = 0.0
+    return flight
+
+
+def test_over_its_pad_it_steps_aside_of_one_that_has_to_climb() -> None:
+    flight = stacked().fly(8.0)
+    assert flight.world.errands["stage"][1] in (stages.CLIMB, stages.TRANSIT)
+    flight.fly(200.0).check()
+
+
+def test_a_climb_that_stays_blocked_is_given_up() -> None:
+    flight = stacked()
+    flight.world.errands["stage"][0] = stages.ADRIFT
+    flight.fly(15.0)
+    assert flight.world.errands["stage"][1] == stages.WAIT
+    flight.fly(200.0)
+    assert flight.world.errands["stage"][1] == stages.LANDED
+    assert math.dist(flight.place(1), (700.0, 500.0)) < 1.0
+
+
+def test_it_waits_a_while_for_somebody_adrift_to_go() -> None:
+    flight = Return([(300.0, 100.0), (700.0, 500.0)], fences(AREA, (), 20.0))
+    adrift_at(flight, 1, PADS[0], 30.0)
+    flight.fly(40.0)
+    assert flight.world.errands["stage"][0] in (stages.OVER_PAD, stages.DESCEND)
+    flight.world.poses["east"][1] += 100.0
+    flight.fly(60.0)
+    assert flight.world.errands["stage"][0] == stages.LANDED
+    assert math.dist(flight.place(0), PADS[0]) < 1.0
 
 
 def test_ways_that_do_not_meet_share_a_layer() -> None:
@@ -134,11 +276,12 @@ def test_ways_that_do_not_meet_share_a_layer() -> None:
 
 
 def test_they_set_out_in_turn_and_one_alone_at_once() -> None:
-    flight = Return(SPREAD, fences(AREA, KEEP_OUTS, 20.0))
-    assert flight.world.errands["release_at"].tolist() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+    flight = Return(spread(30, 1), fences(AREA, (), 20.0), grid(30))
+    released = flight.world.errands["release_at"].copy()
+    assert released.min() == 0.0
+    assert len(set(released)) > 5
     flight.fly()
-    released = flight.world.errands["release_at"]
-    assert all(flight.times[i, stages.TRANSIT] >= released[i] for i in range(6))
+    assert all(flight.times[i, stages.TRANSIT] >= released[i] - 1.0 for i in range(30))
     alone = Return([(100.0, 300.0)], fences(AREA, KEEP_OUTS, 20.0)).fly()
     assert alone.times[0, stages.TRANSIT] < 1.0
     distance = math.dist((100.0, 300.0), PADS[0])
@@ -170,7 +313,7 @@ def test_who_must_climb_past_another_steps_aside_first() -> None:
     world = flight.world
     world.fleet["altitude"] = world.poses["up"] = [50.0, 60.0, 50.0]  # the second searches above the first
     flight.order_only(0).fly(30.0)
-    assert world.errands["layer"][0] == 66.0
+    assert world.errands["layer"][0] == 68.0
     assert world.errands["stage"][0] == stages.TRANSIT
     assert flight.account[0] >= 15.0
 

@@ -5,7 +5,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -15,6 +14,8 @@ from click.testing import CliRunner
 from sim_vehicle_stub.cli import main
 from swarmctl.mavlink.codec import Decoder, Encoder
 from swarmctl.mavlink.dialect import mav
+
+from .stub_process import line_with, running
 
 TIMEOUT_S = 20.0
 
@@ -54,25 +55,6 @@ class Client:
                 if frame.message_id == message_id and condition(frame.fields):
                     return frame
         raise AssertionError(f"no message {message_id}")
-
-
-@contextlib.contextmanager
-def running(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """The command in a process of its own, which is ended in the end."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sim_vehicle_stub.cli", *arguments], stderr=subprocess.PIPE, text=True
-    )
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def line_with(process: subprocess.Popen[str], text: str) -> str:
-    """The next line that the command prints with this text in it."""
-    assert process.stderr is not None
-    return next(line for line in process.stderr if text in line)
 
 
 def heartbeat_of(decoder: Decoder, receive: Callable[[], bytes]) -> Any:

@@ -97,16 +97,18 @@ def test_offboard_needs_a_stream_in_the_air(station: Make) -> None:
 
 
 @pytest.mark.row("px4-offboard")
-def test_offboard_a_fifth_of_a_second_of_stream_is_enough_and_one_setpoint_is_not(station: Make) -> None:
-    s = station(tick_s=0.05)
+@pytest.mark.parametrize(
+    ("old_s", "results", "mode"), [(0.0, [0, 0], OFFBOARD), (1.5, [0, REJECTED], LOITER)]
+)
+def test_offboard_one_setpoint_is_enough_while_it_is_fresh(
+    station: Make, old_s: float, results: list[int], mode: int
+) -> None:
+    s = station()
     s.fly_up(10.0)
     s.setpoint(z=-10.0)
-    assert s.set_mode(OFFBOARD) == [0, REJECTED]
-    for _ in range(4):
-        s.tick()
-        s.setpoint(z=-10.0)
-    assert s.set_mode(OFFBOARD) == [0, 0]
-    assert s.mode == OFFBOARD
+    s.run(old_s)
+    assert s.set_mode(OFFBOARD) == results
+    assert s.mode == mode
 
 
 @pytest.mark.row("px4-setpoints-stop")
