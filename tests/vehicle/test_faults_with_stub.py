@@ -36,7 +36,7 @@ FLIES_ON = Answer(Phase.ENGAGED)
 CRASHED = Answer(Phase.FAILED, EventKind.FAILED, "it came down while engaged", 5.0)
 RESTARTED = Answer(Phase.FAILED, EventKind.FAILED, "it disarmed while engaged", 4.0)
 SILENT = Answer(Phase.LOST, EventKind.LOST, "no heartbeat for 3 s while engaged", 4.1)
-ASTRAY = Answer(Phase.ENGAGED, EventKind.ASTRAY, "it does not fly its setpoints", 13.0)
+ASTRAY = Answer(Phase.ENGAGED, EventKind.ASTRAY, "it does not fly its setpoints", 18.0)
 BATTERY_LOW = Answer(Phase.ENGAGED, EventKind.BATTERY_LOW, "4 % left", 2.0)
 IN_FLIGHT = {
     "arming-refused": FLIES_ON,
@@ -203,7 +203,7 @@ def test_a_vehicle_that_keeps_its_mode_is_given_up_and_says_so(autopilot: str) -
 @pytest.mark.parametrize("autopilot", BOTH)
 def test_a_vehicle_that_does_not_fly_its_setpoints_is_landed_by_order(autopilot: str) -> None:
     flight = begun(autopilot, "ignored-setpoints")
-    flight.until(lambda: bool(flight.texts(EventKind.ASTRAY)), 15.0)
+    flight.until(lambda: bool(flight.texts(EventKind.ASTRAY)), 18.0)
     flight.land()
 
 
