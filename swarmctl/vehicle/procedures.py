@@ -55,7 +55,9 @@ def _rates(adapter: Adapter, settings: SessionSettings, on_failure: OnFailure) -
     """Ask for the rates of what is read; where they are needed, for as long as patience lasts."""
     patience, needed = settings.command_patience_s, on_failure is OnFailure.FAIL
     return tuple(
-        Step("message rates", patience, command=message_interval(i, hz), insists=needed, on_failure=on_failure)
+        Step(
+            "message rates", patience, command=message_interval(i, hz), insists=needed, on_failure=on_failure
+        )
         for i, hz in wanted_rates(adapter, settings).items()
     )
 

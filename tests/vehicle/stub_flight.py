@@ -19,6 +19,8 @@ from swarmctl.vehicle.settings import SessionSettings
 
 ORIGIN = (47.3977, 8.5456, 488.0)
 SPACING_M = 20.0
+SCATTERED = 9
+"""A seed by which altitudes and local origins scatter between vehicles."""
 LIMIT_S = 120.0
 PILOT = 254
 """The system id of another ground station."""

@@ -1,7 +1,6 @@
-"""What ArduCopter was seen to do, played by the stub, and what the session makes of it: each row of the table."""
+"""What ArduCopter was seen to do in flight, played by the stub, and what the session makes of it."""
 
 import math
-from collections import Counter
 
 import pytest
 
@@ -12,15 +11,13 @@ from swarmctl.vehicle.fence import Fence
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.preflight import Preflight
 
-from .stub_flight import ARM_DISARM, ORIGIN, SET_MODE, SETPOINT, StubFlight
+from .stub_flight import ORIGIN, SCATTERED, SET_MODE, SETPOINT, StubFlight
 
 STABILIZE, GUIDED, LOITER, RTL, LAND, BRAKE, SMART_RTL = 0, 4, 5, 6, 9, 17, 21
 FAILED = mav.MAV_RESULT_FAILED
-POSITION, STATE, STATUS, LOCAL, EKF = 33, 245, 1, 32, 193
+POSITION = 33
 PLACE = 1 | 2 | 4
 VELOCITY = 1 | 2 | 4 | 64 | 128 | 256 | 2048
-SCATTERED = 9
-"""A seed by which altitudes and local origins scatter between vehicles."""
 
 
 def engaged(**others: float) -> StubFlight:
@@ -28,87 +25,6 @@ def engaged(**others: float) -> StubFlight:
     flight = StubFlight("ardupilot", **others)
     flight.engage()
     return flight
-
-
-@pytest.mark.row("ardupilot-ready")
-def test_ready_is_guided_with_a_position_and_no_sooner() -> None:
-    flight = StubFlight("ardupilot")
-    flight.run(19.0)
-    assert flight.session.phase is Phase.POSITIONING
-    assert flight.told(POSITION) and not flight.session.telemetry.positioned, "0, 0 is no position"
-    assert 41.0 <= 19.0 + flight.until_phase(Phase.READY) < 45.0
-    assert flight.mode == GUIDED
-    assert not flight.commands(ARM_DISARM)
-
-
-@pytest.mark.row("ardupilot-ready")
-def test_a_vehicle_armed_in_stabilize_is_left_alone_until_it_has_disarmed_itself() -> None:
-    flight = StubFlight("ardupilot")
-    flight.impair(down_cut=True)
-    flight.run(25.0)
-    flight.pilot_commands(ARM_DISARM, 1)
-    flight.impair(down_cut=False)
-    flight.run(9.0)
-    assert flight.vehicle.armed and flight.mode == STABILIZE
-    assert flight.session.phase is Phase.POSITIONING and not flight.commands(SET_MODE)
-    flight.until_phase(Phase.READY)
-    assert not flight.vehicle.armed and flight.mode == GUIDED
-
-
-@pytest.mark.row("ardupilot-ready")
-def test_checks_that_pass_in_stabilize_are_not_enough_for_a_controller_that_comes_late() -> None:
-    """Not even if the heartbeat that tells of GUIDED comes before that mode's own checks."""
-    flight = StubFlight("ardupilot")
-    flight.impair(up_cut=True, down_cut=True)
-    flight.run(28.0)
-    assert flight.vehicle.personality.ready and flight.mode == STABILIZE
-    flight.impair(up_cut=False, down_cut=False)
-    flight.drop = lambda frame: (
-        frame[7] == STATUS and flight.mode == GUIDED and flight.session.telemetry.mode != GUIDED
-    )
-    flight.until_phase(Phase.READY)
-    assert flight.now >= 41.0
-
-
-@pytest.mark.row("ardupilot-ready")
-def test_a_refusal_to_arm_is_quoted() -> None:
-    flight = StubFlight("ardupilot")
-    flight.until_phase(Phase.READY)
-    flight.vehicle.lose_fix()
-    flight.session.take_off(20.0)
-    flight.until_phase(Phase.FAILED)
-    assert 'ARM had no effect in 20 s; last answer FAILED (the vehicle says: "Arm: Need Position' in (
-        flight.session.reason
-    )
-
-
-@pytest.mark.row("ardupilot-streams")
-def test_what_is_read_is_asked_for_and_comes_at_its_rate() -> None:
-    flight = StubFlight("ardupilot")
-    flight.until_phase(Phase.READY)
-    flight.run(1.0)
-    since = flight.now
-    flight.run(20.0)
-    counts = Counter(f.message_id for t, f in flight.crossed if t > since and f.system == 1)
-    wanted = {POSITION: 200, STATE: 40, STATUS: 40, EKF: 20, LOCAL: 20, 0: 20}
-    assert counts.pop(111) == 2 + 20, "its own, and the answers to ours"
-    assert counts == pytest.approx(wanted, abs=1)
-
-
-@pytest.mark.row("ardupilot-streams")
-def test_after_a_reboot_it_is_all_asked_for_again() -> None:
-    flight = StubFlight("ardupilot")
-    flight.until_phase(Phase.READY)
-    asked = Counter(int(f.param1) for f in flight.commands(mav.MAV_CMD_SET_MESSAGE_INTERVAL))
-    flight.vehicle.reboot()
-    flight.until(lambda: flight.session.phase is not Phase.READY, 10.0)
-    since = flight.now
-    flight.until_phase(Phase.READY)
-    again = Counter(int(f.param1) for f in flight.commands(mav.MAV_CMD_SET_MESSAGE_INTERVAL, since))
-    assert again.keys() == asked.keys() == {POSITION, STATE, STATUS, EKF, LOCAL}
-    since = flight.now
-    flight.run(5.0)
-    assert len(flight.told(POSITION, since + 0.05)) == 50
 
 
 @pytest.mark.row("ardupilot-modes")
@@ -153,19 +69,6 @@ def test_every_vehicle_takes_off_to_a_height_above_its_own_home() -> None:
     assert {f.param7 for f in flight.commands(mav.MAV_CMD_NAV_TAKEOFF)} == {20.0}
     told = [session.telemetry.altitude_amsl_m for session in flight.sessions]
     assert max(told) - min(told) > 1.0
-
-
-@pytest.mark.row("ardupilot-takeoff")
-def test_a_vehicle_that_does_not_lift_off_is_told_and_disarms_itself() -> None:
-    flight = StubFlight("ardupilot")
-    flight.until_phase(Phase.READY)
-    flight.vehicle.faults.begin("motor-failure")
-    flight.session.take_off(20.0)
-    flight.until_phase(Phase.FAILED)
-    assert flight.session.reason == (
-        "vehicle 1: take-off: NAV_TAKEOFF had no effect in 20 s; last answer ACCEPTED"
-    )
-    assert flight.until(lambda: not flight.vehicle.armed) <= 10.1
 
 
 @pytest.mark.row("ardupilot-setpoints-during-takeoff")
@@ -332,8 +235,14 @@ def test_with_the_failsafe_on_the_sessions_heartbeats_count_and_their_loss_is_to
 
 
 NORTH = 47.39820
+
+
 KEEP_IN = [(47.3970, 8.5450), (47.3970, 8.5462), (NORTH, 8.5462), (NORTH, 8.5450)]
+
+
 KEEP_OUT = [(47.3972, 8.5460), (47.3972, 8.5461), (47.3973, 8.5461)]
+
+
 FENCE = Preflight(read_parameters=True, fence=Fence([KEEP_IN], [KEEP_OUT]))
 
 
@@ -369,38 +278,6 @@ def test_a_breach_without_avoidance_is_told_and_not_fought() -> None:
     assert flight.session.reason == "vehicle 1: its mode became RTL while engaged"
     assert "Fence Breached" in flight.texts(EventKind.TEXT)
     flight.check_not_fought(5.0)
-
-
-@pytest.mark.row("ardupilot-parameters")
-@pytest.mark.parametrize("autopilot", ["ardupilot", "ardupilot-4.6"])
-def test_parameters_are_read_by_new_and_old_names_in_the_same_units(autopilot: str) -> None:
-    flight = StubFlight(autopilot, preflight=Preflight(read_parameters=True))
-    flight.until_phase(Phase.READY)
-    assert flight.session.parameters == pytest.approx(
-        {
-            "speed_mps": 10.0,
-            "acceleration_mps2": 2.5,
-            "climb_mps": 2.5,
-            "descent_mps": 1.5,
-            "fence_enabled": 0.0,
-            "fence_action": 1.0,
-            "avoidance": 3.0,
-            "setpoint_loss_s": 3.0,
-            "ground_station_loss_action": 0.0,
-            "return_height_m": 15.0,
-        }
-    )
-    assert flight.texts(EventKind.WARNING) == []
-
-
-@pytest.mark.row("ardupilot-no-answer")
-def test_a_session_for_another_system_hears_nothing_and_does_no_harm() -> None:
-    flight = StubFlight("ardupilot", "ardupilot")
-    flight.sessions.reverse()
-    flight.run(60.0)
-    assert {session.phase for session in flight.sessions} == {Phase.CONNECTING}
-    assert {(f.message_id, f.system) for _, f in flight.crossed} == {(0, 255)}
-    assert not any(vehicle.armed for vehicle in flight.fleet.vehicles)
 
 
 @pytest.mark.row("ardupilot-no-answer")

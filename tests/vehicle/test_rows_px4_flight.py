@@ -1,4 +1,4 @@
-"""What PX4 was seen to do, played by the stub, and what the session makes of it: each row of the table."""
+"""What PX4 was seen to do in flight, played by the stub, and what the session makes of it."""
 
 import math
 from collections import Counter
@@ -12,64 +12,17 @@ from swarmctl.vehicle.events import EventKind
 from swarmctl.vehicle.fence import Fence
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.preflight import Preflight
-from swarmctl.vehicle.session import Session
-from swarmctl.vehicle.settings import SessionSettings
 
-from .stub_flight import ARM_DISARM, ORIGIN, SET_MODE, SETPOINT, StubFlight
+from .stub_flight import ARM_DISARM, ORIGIN, SCATTERED, SET_MODE, SETPOINT, StubFlight
 
 OFFBOARD, TAKEOFF, LOITER, RTL, LAND = 0x60000, 0x2040000, 0x3040000, 0x5040000, 0x6040000
 ACCEPTED, NOT_YET = mav.MAV_RESULT_ACCEPTED, mav.MAV_RESULT_TEMPORARILY_REJECTED
 Z_AND_VELOCITY = 1 | 2 | 32 | 64 | 128 | 256 | 2048
 FORCE = 21196
-SCATTERED = 9
-"""A seed by which altitudes and local origins scatter between vehicles."""
 
 
 def is_setpoint(frame: bytes) -> bool:
     return frame[7] == SETPOINT
-
-
-@pytest.mark.row("px4-rates")
-def test_404_messages_a_second_are_turned_down_to_what_is_read() -> None:
-    flight = StubFlight(tick_s=0.01)
-    flight.until_phase(Phase.CONFIGURING)
-    since = flight.now
-    flight.until_phase(Phase.POSITIONING)
-    full = len([1 for t, f in flight.crossed if t < since and f.system == 1])
-    assert full / since > 300.0
-    flight.until_phase(Phase.READY)
-    since = flight.now
-    flight.run(10.0)
-    assert len([1 for t, f in flight.crossed if t > since and f.system == 1]) / 10.0 <= 20.0
-
-
-@pytest.mark.row("px4-rates")
-def test_the_rates_are_turned_down_again_after_a_reboot() -> None:
-    flight = StubFlight()
-    flight.until_phase(Phase.READY)
-    flight.run(10.0)
-    flight.vehicle.reboot()
-    flight.until(lambda: flight.session.phase is not Phase.READY, 10.0)
-    flight.until_phase(Phase.READY)
-    since = flight.now
-    flight.run(10.0)
-    assert len([1 for t, f in flight.crossed if t > since and f.system == 1]) / 10.0 <= 20.0
-
-
-@pytest.mark.row("px4-statustext")
-def test_a_text_in_chunks_is_put_together_and_quoted() -> None:
-    flight = StubFlight()
-    flight.until_phase(Phase.READY)
-    flight.vehicle.faults.begin("arming-refused")
-    flight.session.take_off(20.0)
-    flight.until_phase(Phase.FAILED)
-    text = "Arming denied: Resolve system health failures first"
-    assert max(f.chunk_seq for f in flight.told(mav.MAVLINK_MSG_ID_STATUSTEXT)) == 1
-    assert text in flight.texts(EventKind.TEXT)
-    assert flight.session.reason == (
-        "vehicle 1: arming: ARM had no effect in 20 s; last answer TEMPORARILY_REJECTED "
-        f'(the vehicle says: "{text}")'
-    )
 
 
 @pytest.mark.row("px4-origin", "px4-takeoff")
@@ -82,20 +35,6 @@ def test_every_vehicle_flies_at_the_true_height_by_its_own_origin_and_sea_level(
     assert flight.fleet.truth["up"] == pytest.approx([25.0] * 4, abs=0.1)
     told = [session.telemetry.altitude_amsl_m for session in flight.sessions]
     assert 1.0 < max(told) - min(told) <= 1.4
-
-
-@pytest.mark.row("px4-origin")
-def test_an_origin_that_was_told_before_anybody_listened_is_asked_for() -> None:
-    flight = StubFlight(seed=SCATTERED)
-    flight.drop = lambda frame: frame[7] == mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
-    flight.until_phase(Phase.POSITIONING)
-    flight.run(3.0)
-    assert flight.session.telemetry.origin is None
-    flight.drop = lambda frame: False
-    flight.until_phase(Phase.READY)
-    origin = flight.session.telemetry.origin
-    assert origin is not None
-    assert origin[:2] == pytest.approx(flight.vehicle.local_origin[:2], abs=1e-7)
 
 
 @pytest.mark.row("px4-projection")
@@ -164,17 +103,6 @@ def test_the_first_ack_of_a_mode_change_is_not_believed() -> None:
     assert flight.mode == OFFBOARD
 
 
-@pytest.mark.row("px4-ready")
-def test_a_vehicle_that_disarms_itself_before_it_flies_is_told() -> None:
-    flight = StubFlight()
-    flight.until_phase(Phase.READY)
-    flight.vehicle.faults.begin("motor-failure")
-    flight.session.take_off(20.0)
-    took = flight.until_phase(Phase.FAILED)
-    assert took == pytest.approx(11.0, abs=1.0)
-    assert flight.session.reason == "vehicle 1: it disarmed while taking off"
-
-
 @pytest.mark.row("px4-takeoff")
 def test_take_off_is_to_an_altitude_above_sea_level_and_then_armed() -> None:
     flight = StubFlight()
@@ -194,43 +122,6 @@ def test_offboard_is_asked_for_when_there_is_a_stream() -> None:
     flight.engage()
     assert NOT_YET not in flight.acknowledged(SET_MODE)
     assert len(flight.commands(SET_MODE)) == 1
-
-
-@pytest.mark.row("px4-offboard", "px4-after-landing")
-def test_a_vehicle_that_was_left_in_offboard_is_put_into_loiter_and_gets_ready() -> None:
-    """It would never say that it is ready, or fly as soon as it is armed."""
-    flight = StubFlight()
-    flight.run(6.0)
-    flight.session = Session(1, settings=SessionSettings(), now=flight.now)
-    flight.pilot_sets_mode(OFFBOARD)
-    flight.until_phase(Phase.READY)
-    assert flight.mode == LOITER
-    flight.engage()
-    flight.land()
-
-
-@pytest.mark.row("px4-after-landing")
-def test_a_controller_that_starts_after_a_return_finds_it_harmless() -> None:
-    flight = StubFlight()
-    flight.engage()
-    flight.run(0.5)
-    flight.until_phase(Phase.RELEASED, 5.0)
-    flight.until(lambda: not flight.vehicle.armed)
-    assert flight.mode == OFFBOARD
-    flight.session = Session(1, settings=SessionSettings(), now=flight.now)
-    flight.until_phase(Phase.READY)
-    assert flight.mode == LOITER
-
-
-@pytest.mark.row("px4-after-landing")
-def test_after_a_landing_arming_is_harmless_although_setpoints_flow() -> None:
-    flight = StubFlight()
-    flight.engage()
-    flight.land()
-    assert flight.mode == LOITER
-    flight.pilot_commands(ARM_DISARM, 1)
-    flight.run(5.0)
-    assert flight.body["up"] == 0.0
 
 
 def fly_through_a_gap(offset_s: float) -> Phase:
@@ -306,17 +197,6 @@ def test_no_setpoint_of_a_flight_is_complained_of() -> None:
 
 
 @pytest.mark.row("px4-gcs-loss")
-def test_the_sessions_heartbeats_are_what_arming_needs() -> None:
-    flight = StubFlight()
-    flight.set_parameter("NAV_DLL_ACT", 2)
-    flight.engage()
-    flight.command(1.0, 0.0)
-    flight.run(20.0)
-    assert flight.session.phase is Phase.ENGAGED
-    flight.land()
-
-
-@pytest.mark.row("px4-gcs-loss")
 def test_a_ground_station_that_is_not_heard_is_told_of_and_the_vehicle_retaken_by_order_alone() -> None:
     flight = StubFlight()
     flight.set_parameter("NAV_DLL_ACT", 2)
@@ -368,7 +248,11 @@ def test_the_session_never_asks_for_the_firmwares_return() -> None:
 
 
 KEEP_IN = [(47.3970, 8.5450), (47.3970, 8.5462), (47.3982, 8.5462), (47.3982, 8.5450)]
+
+
 KEEP_OUT = [(47.39785, 8.5457), (47.39785, 8.5459), (47.39795, 8.5458)]
+
+
 FENCE = Preflight(read_parameters=True, fence=Fence([KEEP_IN], [KEEP_OUT]))
 
 
@@ -429,14 +313,3 @@ def test_only_a_forced_disarm_ends_a_flight_and_is_told() -> None:
     flight.pilot_commands(ARM_DISARM, 0, FORCE)
     flight.until_phase(Phase.FAILED, 3.0)
     assert flight.session.reason == "vehicle 1: it disarmed while engaged"
-
-
-@pytest.mark.row("px4-in-the-air")
-def test_the_session_disarms_on_the_ground_alone_and_never_by_force() -> None:
-    flight = StubFlight()
-    flight.set_parameter("COM_DISARM_LAND", 60.0)
-    flight.engage()
-    flight.land()
-    orders = [f for f in flight.commands(ARM_DISARM) if f.param1 == 0.0]
-    assert orders and {f.param2 for f in orders} == {0.0}
-    assert set(flight.acknowledged(ARM_DISARM)) == {ACCEPTED}
