@@ -161,4 +161,5 @@ def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) ->
         row["speed"] = min(float(row["speed"]), told.get("speed_mps", np.inf))
         row["acceleration"] = min(float(row["acceleration"]), told.get("acceleration_mps2", np.inf))
         row["braking"] = min(float(row["acceleration"]), limits.braking_mps2)
-        row["latency"] = limits.latency_s + (session.round_trip_s or 0.0)
+        trip = session.statistics().round_trip
+        row["latency"] = limits.latency_s + (trip.median_s if trip else 0.0)

@@ -1,5 +1,5 @@
-"""What no vehicle tells of itself: a battery that is only just enough, setpoints that are not flown, a link that is
-too slow for them, a way home that takes too long, and who is still in the air when all of ours are down.
+"""What no session tells: a battery that is only just enough, a link that is too slow for setpoints, a way home that
+takes too long, and who is still in the air when all of ours are down.
 
 The swarm asks once a tick; what follows for the others is for the swarm to say.
 """
@@ -26,8 +26,6 @@ RELEASED_S = 1800.0
 """One that somebody else flies is watched until it is down, and may be retaken, but no longer than a battery lasts."""
 SLOW_ROUND_TRIP_S, SLOW_S = 2.0, 10.0
 """A link that is slower than this, and by half a second slower than the guard counts on, for so long."""
-FLIES_MPS, STANDS_MPS, DISOBEYS_S = 2.0, 0.5, 15.0
-"""A vehicle that is told to fly and stands, or is told to stand and flies, for so long does not obey."""
 EMERGENCY_PERCENT = 5
 """A battery so low may not last for the way home."""
 RETURN_S, RETURN_VEHICLE_S, DETOURS = 600.0, 10.0, 4.0
@@ -47,7 +45,6 @@ class Supervision:
         self._kept_percent = mission.safety.battery_return_percent
         self._world, self._sessions, self._roster, self._note = world, sessions, roster, note
         self._battery_low = [False] * len(sessions)
-        self._obeyed_at = np.zeros(len(sessions))
         self._quick_at = np.zeros(len(sessions))
         self._told_to_land: set[int] = set()
         self._watched_since: float | None = None
@@ -75,19 +72,6 @@ class Supervision:
             percent = session.telemetry.battery_percent
             if session.phase is Phase.ENGAGED and percent is not None and percent <= EMERGENCY_PERCENT:
                 rows.append(i)
-        return rows
-
-    def disobedient(self, now: float) -> list[int]:
-        """Rows of those that have done the contrary of their setpoints for a while; each is told once."""
-        world = self._world
-        told = np.hypot(world.setpoints["v_east"], world.setpoints["v_north"])
-        speed = np.hypot(world.poses["v_east"], world.poses["v_north"])
-        flown = np.isin(world.errands["stage"], (stages.SEARCH, stages.TRANSIT))
-        stands = (told >= FLIES_MPS) & (speed < STANDS_MPS)
-        runs = (told < STANDS_MPS) & (speed >= FLIES_MPS)
-        self._obeyed_at[~(flown & (stands | runs))] = now
-        rows: list[int] = np.flatnonzero(now - self._obeyed_at >= DISOBEYS_S).tolist()
-        self._obeyed_at[rows] = now
         return rows
 
     def out_of_touch(self, now: float) -> list[int]:

@@ -203,6 +203,8 @@ class Swarm:
         """Something went wrong with a vehicle: the mission says whether the others go on."""
         if event.kind is EventKind.REGAINED:
             self._welcome(i)
+        elif event.kind is EventKind.ASTRAY:
+            self._bring_down(i, now, "lands where it is")
         elif event.kind is EventKind.POSITION_LOST and self.part is not Part.PREPARING:
             self._trouble(i, event.text, now)
         elif event.kind in FAILURES:
@@ -230,8 +232,6 @@ class Swarm:
         if self.part in (Part.SEARCHING, Part.RETURNING):
             for i in self._supervision.exhausted():
                 self._bring_down(i, now, "battery all but empty: lands where it is")
-            for i in self._supervision.disobedient(now):
-                self._bring_down(i, now, "does not fly its setpoints: lands where it is")
             for i in self._supervision.out_of_touch(now):
                 self._bring_down(i, now, "its link is too slow for setpoints: lands where it is")
         if self.part is Part.RETURNING:

@@ -52,10 +52,10 @@ def configuring(adapter: Adapter, settings: SessionSettings) -> Steps:
 
 
 def _rates(adapter: Adapter, settings: SessionSettings, on_failure: OnFailure) -> Steps:
-    """Ask for the rates of what is read."""
-    patience = settings.command_patience_s
+    """Ask for the rates of what is read; where they are needed, for as long as patience lasts."""
+    patience, needed = settings.command_patience_s, on_failure is OnFailure.FAIL
     return tuple(
-        Step("message rates", patience, command=message_interval(i, hz), on_failure=on_failure)
+        Step("message rates", patience, command=message_interval(i, hz), insists=needed, on_failure=on_failure)
         for i, hz in wanted_rates(adapter, settings).items()
     )
 

@@ -87,7 +87,7 @@ def test_a_released_vehicle_may_be_retaken_after_all_others_are_down(tmp_path: P
 def test_watching_others_vehicles_ends_with_ctrl_c(tmp_path: Path) -> None:
     live = Live(tmp_path)
     live.at = [
-        (50.0, order("release 2")),
+        (45.0, order("release 2")),  # where it hovers in nobody's way home
         *((250.0 + k, lambda live: live.orders.interrupt()) for k in (0, 1)),
     ]
     outcome = live.fly()

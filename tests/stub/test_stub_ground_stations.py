@@ -100,5 +100,5 @@ def test_px4_streams_what_a_ground_station_shows(station: Make) -> None:
     s = station(tick_s=0.01)
     s.run(5.0)
     last_second = [fields.message_id for time, fields in s.heard if time > 4.0]
-    assert (last_second.count(24), last_second.count(74)) == (5, 10)
+    assert (last_second.count(24), last_second.count(74)) == (8, 10)
     assert s.last(24).fix_type == mav.GPS_FIX_TYPE_3D_FIX

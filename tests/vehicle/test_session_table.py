@@ -60,7 +60,6 @@ def disarm(rig: Any) -> None:
 def blind(rig: Any) -> None:
     """The position goes; on the ground, what comes next does not come meanwhile."""
     if rig.session.phase is Phase.POSITIONING:
-        rig.vehicle.healthy = False
         rig.until(lambda: rig.session.telemetry.positioned)
     rig.vehicle.memory.receive = lambda message_id, fields: None
     rig.vehicle.fixed = False
@@ -146,6 +145,7 @@ def prepare(rig: Any, phase: Phase, signal: Signal) -> None:
         rig.reach(Phase.READY if signal is Signal.LINK_BACK_IN_SET_UP else Phase.HOLDING)
         hush(rig)
     else:
+        rig.vehicle.healthy = (phase, signal) != (Phase.POSITIONING, Signal.POSITION_LOST)
         rig.reach(phase)
 
 
