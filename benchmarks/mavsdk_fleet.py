@@ -42,6 +42,8 @@ SPACING_M, HEIGHT_M = 10.0, 5.0
 VELOCITY = VelocityNedYaw(1.0, 0.5, 0.0, 0.0)
 BOOTED_S = 10
 """The vehicles booted so long ago and are ready."""
+STREAMS_US = {0: 1_000_000, 1: 500_000, 33: 100_000, 245: 500_000}
+"""What the vehicles tell, as to a client that has turned the rest off (for much of it MAVSDK has no call)."""
 SETTLED_S, PATIENCE_S = 3.0, 60.0
 SETPOINT, OFFBOARD = 84, 0x60000
 SO_TIMESTAMPNS, TIMESPEC = 35, struct.Struct("@ll")
@@ -114,15 +116,10 @@ def discover(mavsdk: Mavsdk, vehicles: int, port: int) -> list[System]:
 
 
 def engage(systems: Sequence[System]) -> list[Offboard]:
-    """Take all off, into OFFBOARD; of telemetry, leave 10 positions and 2 states a second."""
+    """Take all off, into OFFBOARD."""
     telemetries = [Telemetry(system) for system in systems]
     actions = [Action(system) for system in systems]
-    for telemetry, action in zip(telemetries, actions, strict=True):
-        telemetry.set_rate_attitude_euler(-1.0)
-        telemetry.set_rate_position_velocity_ned(-1.0)
-        telemetry.set_rate_position(10.0)
-        telemetry.set_rate_health(2.0)
-        telemetry.set_rate_in_air(2.0)
+    for action in actions:
         action.set_takeoff_altitude(HEIGHT_M)
         action.arm()
         action.takeoff()
@@ -186,6 +183,8 @@ async def play(vehicles: int, port: int) -> None:
         fleet.advance(float(second))
     for vehicle in fleet.vehicles:
         vehicle.outgoing()
+        for message_id in vehicle.personality.INTERVALS_US:
+            vehicle.set_interval(message_id, STREAMS_US.get(message_id, -1))
     links: list[TimedLink] = []
 
     async def open_links(fleet: StubFleet, clock: Clock) -> list[TimedLink]:

@@ -5,9 +5,15 @@ functions are cached by Numba.  The cache folder is named by a digest of every s
 versions of Python, NumPy and Numba, and of the NUMBA_* settings that change code: an edited kernel never
 meets an old cache.  With no writable user cache a temporary folder is used.  This is the only module of the
 core that touches files.
+
+What one process compiled is linked in another beside what a third one did, by name; and Numba's names count
+functions and record types from one in every process.  Two planners' copies of a function could so have one name
+for two layouts of memory, and whichever is loaded second runs the other's.  So each process counts from a
+number of its own.
 """
 
 import hashlib
+import itertools
 import os
 import sys
 import tempfile
@@ -19,11 +25,13 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.bytecode import FunctionIdentity
 
 from . import loop, planners
 
 F = TypeVar("F", bound=Callable[..., object])
 BOUND = ("prepare", "observe", "share", "deliver", "decide", "period", "run_ideal", "run_multicopter")
+_OWN_NUMBER_BYTES = 6
 _NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
 
 
@@ -60,6 +68,7 @@ def _compile(function: Callable[..., Any], name: str, free: dict[str, Any]) -> A
 def _use_cache() -> Path:
     folder = cache_folder()
     numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(_OWN_NUMBER_BYTES), "big"))
     return folder
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,19 +32,27 @@ world.decide(0)
 stats = world.kernels.decide.stats
 print(json.dumps({
     "file": bind.__file__, "wish": world.wishes[0].tolist(), "first_time": first_time, "digest": bind.digest(),
+    "symbols": [overload.fndesc.mangled_name for overload in world.kernels.decide.overloads.values()],
     "hits": sum(stats.cache_hits.values()), "misses": sum(stats.cache_misses.values()),
 }))
 """
 
 
-def step_in_new_process(copy: Path) -> dict[str, object]:
+def copy_core(to: Path) -> None:
+    """The package as far as the kernels need it."""
+    core = Path(swarmctl.__file__).parent / "core"
+    shutil.copytree(core, to / "swarmctl" / "core", ignore=shutil.ignore_patterns("__pycache__"))
+    (to / "swarmctl" / "__init__.py").touch()
+
+
+def step_in_new_process(copy: Path) -> dict[str, Any]:
     """What one planned step in a process of its own says, with the package at ``copy`` and a cache beside it."""
     env = {**os.environ, "PYTHONPATH": str(copy), "XDG_CACHE_HOME": str(copy / "cache")}
     env.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
         [sys.executable, "-c", ONE_STEP], env=env, cwd=copy, capture_output=True, text=True, check=True
     )
-    said: dict[str, object] = json.loads(done.stdout)
+    said: dict[str, Any] = json.loads(done.stdout)
     assert str(said["file"]).startswith(str(copy))
     return said
 
@@ -55,11 +64,7 @@ def compiled_files(copy: Path) -> dict[str, int]:
 
 
 def test_an_edited_kernel_is_flown_and_an_unedited_one_loaded(tmp_path: Path) -> None:
-    core = Path(swarmctl.__file__).parent / "core"
-    (tmp_path / "swarmctl").mkdir()
-    (tmp_path / "swarmctl" / "__init__.py").touch()
-    shutil.copytree(core, tmp_path / "swarmctl" / "core", ignore=shutil.ignore_patterns("__pycache__"))
-
+    copy_core(tmp_path)
     first = step_in_new_process(tmp_path)
     assert first["wish"] == [25.0, 0.0]
     assert (first["first_time"], first["misses"]) == (True, 1)
@@ -81,6 +86,15 @@ def test_an_edited_kernel_is_flown_and_an_unedited_one_loaded(tmp_path: Path) ->
     assert third["wish"] == [0.0, -25.0]
     assert (third["first_time"], third["hits"], third["misses"]) == (False, 1, 0)
     assert compiled_files(tmp_path) == before
+
+
+def test_no_two_processes_name_what_they_compile_alike(tmp_path: Path) -> None:
+    """A name that two planners' code had in one cache would have the second flown by the first one's."""
+    symbols: list[object] = []
+    for name in ("one", "another"):
+        copy_core(tmp_path / name)
+        symbols += step_in_new_process(tmp_path / name)["symbols"]
+    assert len(symbols) == len(set(symbols)) == 2
 
 
 def test_the_digest_knows_settings_that_change_code_and_only_those(monkeypatch: pytest.MonkeyPatch) -> None:
