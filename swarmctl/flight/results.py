@@ -168,8 +168,8 @@ class Outcome:
                 "outcome": self._outcome(i, session),
                 "detected": int(self.swarm.seen[i].sum()),
                 "distance_m": round(float(flown[i]), 1),
-                "link": _link(session.statistics()),
                 "events": self.swarm.roster.messages[i],
+                "link": _link(session.statistics()),
             }
             for i, session in enumerate(self.sessions)
         ]

@@ -48,7 +48,17 @@ PER_VEHICLE: dict[str, tuple[type, ...]] = {
     "detected": (int,),
     "distance_m": NUMBER,
     "events": (list,),
+    "link": (dict,),
 }
+LINK = {
+    "messages_lost": 0,
+    "loss": 0.0,
+    "messages_late": 0,
+    "messages_bad": 0,
+    "setpoint_interval_ms": {"min": 100.0, "p50": 100.0, "p99": 100.0, "max": 100.0},
+    "round_trip_ms": {"min": 100.0, "p50": 100.0, "p99": 100.0, "max": 100.0},
+}
+"""In lockstep nothing is lost, and an answer comes in the next tick."""
 MOST_EXTRA_KEYS = 4
 
 
@@ -99,6 +109,9 @@ def test_summary_has_the_promised_keys_and_types(flown: Flown) -> None:
     for vehicle in written["per_vehicle"]:
         assert list(vehicle) == list(PER_VEHICLE)
         assert [key for key in PER_VEHICLE if not isinstance(vehicle[key], PER_VEHICLE[key])] == []
+        assert {key: vehicle["link"][key] for key in LINK} == LINK
+        assert vehicle["link"]["messages_received"] > 1000
+        assert vehicle["link"]["setpoints_sent"] > 500
     assert [v["id"] for v in written["per_vehicle"]] == [1, 2, 3]
     assert {v["autopilot"] for v in written["per_vehicle"]} == {"px4"}
     assert list(written["time_to_s"]) == ["25", "50", "75", "85"]

@@ -18,7 +18,6 @@ WEATHER: dict[str, dict[str, Any]] = {
     "single bytes": {"single_bytes": True},
     "all at once": {"loss": 0.3, "duplication": 0.3, "reordering": 0.3, "garbage": 0.3, "delay_s": 0.3},
 }
-NEAREST_M = 9.0
 PATIENT: dict[str, object] = {"safety.link_loss_s": 10}
 TAKES_OFF_S = {"px4": 20.0, "ardupilot": 55.0}
 """About when the vehicles leave the ground: their firmware boots first."""
@@ -31,14 +30,10 @@ def test_bad_weather_is_flown_through(autopilot: str, weather: str, tmp_path: Pa
     live.impair(**WEATHER[weather])
     outcome = live.fly()
     summary = outcome.summary("")
-    assert outcomes(outcome) == ["landed"] * 3
+    assert (outcomes(outcome), outcome.exit_code()) == (["landed"] * 3, 0)
     assert all(live.down)
     assert summary["searched_s"] == 70.0
-    # The guard counts on steady delays.  Without them a pair may come nearer than it should, and that is told.
-    assert summary["min_separation_m"] >= NEAREST_M
-    too_near = summary["min_separation_m"] < 15.0
-    assert outcome.exit_code() == (1 if too_near else 0)
-    assert bool(outcome.complaints()) is too_near
+    assert min(summary["min_separation_m"], live.nearest_m) >= 15.0
     assert summary["geofence_violations"] == 0
     assert live.now < 450.0
 
@@ -51,11 +46,26 @@ def test_a_link_that_loses_two_fifths_ends_landed_or_reported(
     """PX4's own failsafe may step in when ten setpoints in a row are lost: then it is let go, and lands."""
     live = Live(tmp_path, PATIENT, [autopilot] * 3, seed=seed)
     live.impair(loss=0.4)
-    outcome = live.fly()
+    try:
+        outcome = live.fly()
+    except RefusedError as error:
+        assert "gave up: " in str(error) and not any(vehicle.armed for vehicle in live.fleet.vehicles)
+        return
     for system, how in enumerate(outcomes(outcome), start=1):
         assert how == "landed" or (how in ("released", "lost") and events(outcome, system))
     assert all(live.down)
     assert live.now < 900.0
+
+
+@pytest.mark.parametrize("autopilot", AUTOPILOTS)
+@pytest.mark.parametrize("delay_s", [0.3, 0.6])
+def test_a_steady_delay_keeps_them_apart(autopilot: str, delay_s: float, tmp_path: Path) -> None:
+    live = Live(tmp_path, PATIENT, [autopilot] * 3)
+    live.impair(delay_s=delay_s)
+    outcome = live.fly()
+    assert (outcomes(outcome), outcome.exit_code()) == (["landed"] * 3, 0)
+    assert live.nearest_m >= 15.0
+    assert outcome.summary("")["geofence_violations"] == 0
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
@@ -70,7 +80,7 @@ def test_a_link_with_a_second_of_delay_each_way_ends_on_the_ground(autopilot: st
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
 @pytest.mark.parametrize("way", ["up_cut", "down_cut"])
-@pytest.mark.parametrize("after_s", [5.0, 30.0, 90.0])
+@pytest.mark.parametrize("after_s", [5.0, 30.0, 60.0])
 def test_a_link_that_carries_one_way_only(autopilot: str, way: str, after_s: float, tmp_path: Path) -> None:
     """Nobody is waited for for ever, the others come home, and what may still be in the air is told."""
     live = Live(tmp_path, autopilots=[autopilot] * 3)

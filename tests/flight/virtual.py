@@ -5,9 +5,11 @@ run is the same run.  Between controller and stubs are the vehicles' own bad net
 """
 
 import asyncio
+import math
 import selectors
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -143,6 +145,7 @@ class Live:
     swarm: Swarm | None = None
     orders: Orders = field(default_factory=Orders)
     now: float = 0.0
+    nearest_m: float = math.inf  #: how near two vehicles in the air at one height truly came
 
     def __post_init__(self) -> None:
         self.fleet = StubFleet(
@@ -186,8 +189,16 @@ class Live:
 
     def _step(self, now: float) -> None:
         self.now = now
+        self._measure()
         while self.at and self.at[0][0] <= now:
             self.at.pop(0)[1](self)
+
+    def _measure(self) -> None:
+        aloft = [body for body in self.fleet.truth if body["up"] > 0.5]
+        for one, other in combinations(aloft, 2):
+            if abs(one["up"] - other["up"]) < 5.0:
+                apart = math.hypot(one["east"] - other["east"], one["north"] - other["north"])
+                self.nearest_m = min(self.nearest_m, apart)
 
 
 def outcomes(outcome: Outcome) -> list[str]:
