@@ -9,6 +9,7 @@ takes to send bare velocity setpoints to N stub vehicles at 20 Hz (no planner, n
 
 import argparse
 import json
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -77,6 +78,8 @@ def fly(vehicles: int, seconds: float, rate_hz: float, algorithm: str) -> dict[s
         account = Account()
         run = RunFolder.create(path / "run", algorithm=algorithm, now=None)  # type: ignore[arg-type]
         outcome = fly_with_stubs(mission, 1, run, 1.0, Orders(), account)
+    for line in outcome.complaints():
+        print(line, file=sys.stderr)
     intervals = np.concatenate([np.asarray(s.setpoint_intervals_s) for s in outcome.sessions]) * 1e3
     trips = [s.statistics().round_trip for s in outcome.sessions]
     return {
@@ -108,7 +111,9 @@ def main() -> None:
     if arguments.mavsdk:
         import mavsdk_fleet
 
-        print(f"MAVSDK: {mavsdk_fleet.measure(arguments.mavsdk, 20.0, arguments.seconds)}")
+        figures = mavsdk_fleet.measure(arguments.mavsdk, 20.0, arguments.seconds)
+        name = f"MAVSDK, {figures.vehicles} at 20 Hz"
+        print(f"{name:24}{figures.p50_ms:9.1f}{figures.p99_ms:9.1f}{'':9}{100 * figures.core_share:9.1f}")
 
 
 def show(figures: dict[str, Any], as_json: bool) -> None:

@@ -35,7 +35,7 @@ REPORT_S = 0.5
 """Wall time between two reports."""
 STUB_LATENCY_S = 0.1
 """From a position's measurement to the setpoint's effect, on stubs of this machine."""
-UNSURE_S = 0.25
+UNSURE_S, UNSURE_OF_STUBS_S = 0.25, 0.05
 """So well is the time known after which a vehicle acts; the guard keeps what the fastest one flies in it besides."""
 INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal (SIGHUP) must not leave vehicles in the air any more than Ctrl-C."""
@@ -125,8 +125,8 @@ async def _fly_prepared(
     scenario = Scenario(mission, ideal=False, stands=as_found)
     world = scenario.world(seed)
     describe_vehicles(world.fleet, sessions, options.own_stubs)
-    if not options.own_stubs:
-        world.rules["separation"] += UNSURE_S * float(world.fleet["speed"].max())
+    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
+    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
     text = f"# Flown with --seed {seed}.\n" + dump(mission)
     folder.write_text(folder.mission, text)
     journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)

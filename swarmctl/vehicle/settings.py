@@ -27,7 +27,7 @@ class SessionSettings:
     attempts: int = 12  #: unanswered sendings of one command until the session gives up
     confirm_timeout_s: float = 2.5  #: an accepted command that telemetry does not confirm is sent again
     retry_pause_s: float = 1.0  #: before a temporarily rejected command is sent again
-    astray_s: float = 8.0  #: setpoints not flown for so long are reported
+    astray_s: float = 10.0  #: the contrary of setpoints flown for so long is reported
     position_loss_s: float = 2.0  #: heartbeats without a valid position for so long: the position is lost
     battery_low_percent: float | None = None  #: at or below it, the battery is reported as low; None: never
 

@@ -1,8 +1,8 @@
 """Watches a vehicle's telemetry for what nobody tells: its position gone, its battery low, setpoints not flown.
 
 The position is lost when heartbeats still come but no valid position does.  With no heartbeat either it is
-the link that is lost, which is another matter.  A vehicle is astray when it flies otherwise than it is told
-and does nothing about it; one that is slow to turn or falls short of its speed is not.
+the link that is lost, which is another matter.  A vehicle is astray when it does the contrary of what it is
+told and nothing about it; one that is slow to turn, falls short of its speed or dodges among others is not.
 """
 
 import math
@@ -14,10 +14,13 @@ from .telemetry import Telemetry
 RESTART_MS = 5000
 # Heartbeats since the last position: a single one may just have come first after a gap.
 BEATS_WITHOUT_POSITION = 2
-# Off what it is told by so much (m/s) and by such a part of it, a vehicle should come nearer by so much (m/s).
-ASTRAY_MPS, ASTRAY_SHARE, MENDED_MPS = 2.0, 0.5, 1.0
+# Faster than the one is flying, slower than the other is standing (m/s); so much of a step towards what it is told
+# is obeying (m/s); and an angle of 120 degrees off (its cosine) is flying the other way.
+FLIES_MPS, STANDS_MPS, MENDED_MPS, BACKWARDS = 2.0, 0.5, 1.0, -0.5
 # Setpoints further apart than this (s) are two streams.
 STREAM_GAP_S = 1.0
+# Over so long (s) what it is told is smoothed: nobody can follow setpoints that change at every tick.
+SMOOTHING_S = 2.0
 
 
 class Watch:
@@ -34,6 +37,7 @@ class Watch:
         self._astray_told = False
         self._told_at = self._astray_since = -math.inf
         self._astray_from = (0.0, 0.0)
+        self._told = (0.0, 0.0)  # smoothed: among many others a vehicle is told to dodge this way and that
         self.forgive()
 
     def forgive(self) -> None:
@@ -61,11 +65,14 @@ class Watch:
     def astray(self, v_east: float, v_north: float, telemetry: Telemetry, now: float) -> bool:
         """Whether a vehicle that is told this velocity (m/s) has been astray for long; said once, until it obeys."""
         flown = (telemetry.v_east, telemetry.v_north)
-        gap = math.hypot(v_east - flown[0], v_north - flown[1])
-        begins = now - self._told_at > STREAM_GAP_S / self._settings.time_scale
+        pause_s = (now - self._told_at) * self._settings.time_scale
+        begins = pause_s > STREAM_GAP_S
         self._told_at = now
-        off = gap > max(ASTRAY_MPS, ASTRAY_SHARE * math.hypot(v_east, v_north))
-        if begins or not off or self._mends(v_east, v_north, flown, gap):
+        self._told = flown if begins else _smoothed(self._told, (v_east, v_north), pause_s / SMOOTHING_S)
+        off = _contrary(self._told, flown) or (
+            math.hypot(v_east, v_north) < STANDS_MPS <= FLIES_MPS <= math.hypot(*flown)
+        )
+        if begins or not off or self._mends(v_east, v_north, flown):
             self._astray_told &= off
             self._astray_since, self._astray_from = now, flown
             return False
@@ -74,7 +81,23 @@ class Watch:
         self._astray_told = True
         return True
 
-    def _mends(self, v_east: float, v_north: float, flown: tuple[float, float], gap: float) -> bool:
+    def _mends(self, v_east: float, v_north: float, flown: tuple[float, float]) -> bool:
         """Whether it has come nearer to what it is told now."""
         d_east, d_north = flown[0] - self._astray_from[0], flown[1] - self._astray_from[1]
-        return d_east * (v_east - flown[0]) + d_north * (v_north - flown[1]) >= MENDED_MPS * gap
+        to_east, to_north = v_east - flown[0], v_north - flown[1]
+        return d_east * to_east + d_north * to_north >= MENDED_MPS * math.hypot(to_east, to_north)
+
+
+def _contrary(told: tuple[float, float], flown: tuple[float, float]) -> bool:
+    """Whether a vehicle stands that is told to fly, or flies the other way."""
+    wanted, speed = math.hypot(*told), math.hypot(*flown)
+    if wanted < FLIES_MPS:
+        return False
+    along = told[0] * flown[0] + told[1] * flown[1]
+    return speed < STANDS_MPS or (speed >= FLIES_MPS and along < BACKWARDS * wanted * speed)
+
+
+def _smoothed(before: tuple[float, float], told: tuple[float, float], share: float) -> tuple[float, float]:
+    """``before``, moved by ``share`` of the way towards ``told``."""
+    share = min(share, 1.0)
+    return before[0] + share * (told[0] - before[0]), before[1] + share * (told[1] - before[1])

@@ -59,7 +59,7 @@ def test_the_vehicle_ends_so_and_the_others_come_home(fault: str, autopilot: str
     assert live.down[1] is ((fault, autopilot) not in STAYS_UP)
     if not live.down[1]:
         assert "left in the air, as far as is known" in events(outcome, 2)
-    if fault != "stuck-mode":
+    if fault not in ("stuck-mode", "ignored-setpoints"):  # noticed late, or only on the way home
         assert outcome.summary("")["searched_s"] < 70.0
 
 
