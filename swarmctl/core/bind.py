@@ -27,7 +27,7 @@ import numba
 import numpy as np
 from numba.core.bytecode import FunctionIdentity
 
-from . import loop, planners
+from . import loop, planners, state
 
 F = TypeVar("F", bound=Callable[..., object])
 BOUND = ("prepare", "observe", "share", "deliver", "decide", "period", "run_ideal", "run_multicopter")
@@ -79,7 +79,8 @@ def is_compiled(name: str) -> bool:
 
 @cache
 def bind(name: str) -> SimpleNamespace:
-    """The loop's entry points for algorithm ``name``, and its memory's dtype; KeyError for an unknown one.
+    """The loop's entry points for algorithm ``name``, and the dtypes of its memory and its beacons; KeyError for
+    an unknown one.
 
     They compile at their first call with given array types, or load from the cache.
     """
@@ -88,7 +89,8 @@ def bind(name: str) -> SimpleNamespace:
     free: dict[str, Any] = {"start": module.start, "tell": module.tell, "plan": module.step}
     for entry in BOUND:
         free[entry] = _compile(getattr(loop, entry), f"{entry}_{name.replace('-', '_')}", free)
-    return SimpleNamespace(memory_dtype=module.MEMORY, **free)
+    beacon = getattr(module, "BEACON", state.BEACON)
+    return SimpleNamespace(memory_dtype=module.MEMORY, beacon_dtype=beacon, **free)
 
 
 def compiled(kernel: F) -> F:

@@ -79,7 +79,7 @@ class World:
         self.report_count: Integers = np.zeros(count, np.int64)
         self.alarms: Integers = np.zeros(count, np.int64)
         self.found: Integers = np.full(targets, -1, np.int64)
-        self.beacons = np.zeros((depth, count), state.BEACON)
+        self.beacons = np.zeros((depth, count), self.kernels.beacon_dtype)
         self.heard: Integers = np.zeros((depth, count, neighbours), np.int64)
         self.heard_count: Integers = np.zeros((depth, count), np.int64)
         self.wishes = np.zeros(count, state.WISH)
@@ -89,6 +89,7 @@ class World:
         self.setpoints = np.zeros(count, state.SETPOINT)
         self.sent: Floats = np.zeros((count, MOST_UNDER_WAY + 1, 2))
         self.orders: Integers = np.zeros(count, np.int64)
+        self.nearest_m = float("nan")  #: the nearest two vehicles came in a run of ideal dynamics
 
     @property
     def depth(self) -> int:

@@ -180,7 +180,7 @@ class _Replayer:
         self.result.decisions += len(world.fleet)
         world.share(tick)
         if not self.other:
-            beacons = as_now(pending["/beacons"].rows, state.BEACON, "/beacons")
+            beacons = as_now(pending["/beacons"].rows, world.beacons.dtype, "/beacons")
             self._compare("beacon", tick, decided.time_s, beacons, world.beacons[tick % world.depth])
             world.beacons[tick % world.depth] = beacons
         self._give_heard(as_now(pending["/heard"].rows, rows.HEARD, "/heard"), tick % world.depth)
