@@ -104,7 +104,8 @@ def wilson(share: float, count: int) -> Interval:
     middle = share + z * z / (2 * count)
     half = z * (share * (1 - share) / count + z * z / (4 * count * count)) ** 0.5
     whole = 1 + z * z / count
-    return max(0.0, (middle - half) / whole), min(1.0, (middle + half) / whole)
+    # The share lies within by right; rounding alone would leave none of n outside.
+    return min(share, (middle - half) / whole), max(share, (middle + half) / whole)
 
 
 def numbers(values: ArrayLike) -> list[float | None]:
