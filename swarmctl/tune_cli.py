@@ -1,10 +1,11 @@
 """``swarmctl tune``: an algorithm's best setting, found on training seeds and told on fresh ones."""
 
 import json
+import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from .core.planners import MODULES
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from .record.folder import RunFolder
     from .study.tune import Question, Told
     from .study.tuned import Answer
 
@@ -67,16 +69,17 @@ def tune(
 
     Prints the planner section of a mission.  Parameters that the mission or --set gives are held.
     """
-    with plain_errors():
+    with plain_errors(), ExitStack() as ending:
         from .mission.load import load
         from .study.tune import Question
 
         mission = load(mission_file, {**_settings(settings), "planner.algorithm": algorithm})
         question = Question(mission, algorithm, metric, runs, seed)
         folder = _folder(out, algorithm)
+        ending.callback(folder.remove_if_empty)
         with (
-            stoppable(f"go on with: --out {folder}"),
-            _locked(folder),
+            stoppable(f"go on with: --out {folder.path}"),
+            _alone(folder),
             _workers(workers, address) as executor,
         ):
             found = _tune(question, trials, fresh, folder, executor)
@@ -100,27 +103,30 @@ def _settings(given: Sequence[str]) -> dict[str, object]:
     return pairs
 
 
-def _folder(out: Path | None, algorithm: str) -> Path:
+def _folder(out: Path | None, algorithm: str) -> "RunFolder":
     """The folder of the trials: a new one, or ``out`` if it has trials."""
     from .flight.fly import default_folder
+    from .record.folder import RunFolder
 
     if out is not None and (out / TRIALS).is_file():
-        return out
-    return default_folder(out, f"tune-{algorithm}").path
+        return RunFolder(out)
+    return default_folder(out, f"tune-{algorithm}")
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def _alone(folder: "RunFolder") -> Iterator[None]:
     """Keep another tuning out of the folder."""
     import fcntl
 
-    with (folder / ".lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            say(f"{folder}: another tuning is at work there")
-            sys.exit(BAD_INPUT)
+    lock = os.open(folder.path, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
+    except BlockingIOError:
+        say(f"{folder.path}: another tuning is at work there")
+        sys.exit(BAD_INPUT)
+    finally:
+        os.close(lock)
 
 
 def _workers(workers: int | None, address: str | None) -> "AbstractContextManager[Executor]":
@@ -154,14 +160,16 @@ def stoppable(how_on: str) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _tune(question: "Question", trials: int, fresh: int, folder: Path, executor: "Executor") -> "Answer":
+def _tune(
+    question: "Question", trials: int, fresh: int, folder: "RunFolder", executor: "Executor"
+) -> "Answer":
     from .study import tune as tuning
     from .study.tuned import answer
 
-    study = tuning.open_trials(question, folder / TRIALS)
+    study = tuning.open_trials(question, folder.path / TRIALS)
     before = len(tuning.finished(study))
     say(
-        f"tuning {question.algorithm} by {question.metric}: {trials} trials of {question.runs} runs, into {folder}"
+        f"tuning {question.algorithm} by {question.metric}: {trials} trials of {question.runs} runs, into {folder.path}"
         + (f" ({before} of them are there already)" if before else "")
     )
     with _progress(question, trials) as told:
@@ -188,11 +196,9 @@ def _progress(question: "Question", trials: int) -> "Iterator[Told]":
         yield told
 
 
-def _write(found: "Answer", folder: Path) -> None:
-    from .record.folder import write_whole
-
-    write_whole(folder / YAML, text(found).encode())
-    write_whole(folder / ANSWER, (json.dumps(found.as_json(), indent=2, allow_nan=False) + "\n").encode())
+def _write(found: "Answer", folder: "RunFolder") -> None:
+    folder.write_text(folder.path / YAML, text(found))
+    folder.write_json(folder.path / ANSWER, found.as_json())
 
 
 def text(found: "Answer") -> str:

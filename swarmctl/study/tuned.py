@@ -60,7 +60,7 @@ class Answer:
             return "no setting that was tried beats the default on the training seeds: keep the default"
         if self.is_better:
             return "the setting is better on fresh seeds too"
-        return "the setting is NOT better on fresh seeds, its lead in training was luck: keep the default"
+        return "the setting is NOT better on fresh seeds, or by no more than chance would have it: keep the default"
 
     def lines(self) -> list[str]:
         """What a person wants to know of it."""
