@@ -65,7 +65,7 @@ def _compile(function: Callable[..., Any], name: str, free: dict[str, Any], inli
     bound = FunctionType(function.__code__, {**function.__globals__, **free}, name)
     bound.__qualname__ = name  # Numba's cache index goes by it
     # Without Numba's runtime: see jit.kernel.
-    options = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": inline}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": inline}
     return numba.njit(cache=True, **options)(bound)
 
 

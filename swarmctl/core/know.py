@@ -26,7 +26,7 @@ def _slot(has: Integers, i: int, serial: int) -> int:
     slot = serial & mask
     while has[i, slot] != 0 and has[i, slot] != serial + 1:
         slot = (slot + 1) & mask
-    return slot
+    return int(slot)
 
 
 @kernel

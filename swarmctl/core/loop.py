@@ -1,8 +1,9 @@
 """The loop: sense → know ⇄ radio → plan, once a planner period, for every vehicle.
 
-Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell``,
-``plan`` and ``LISTS`` (whether beacons carry contacts).  A flight calls the four stages one by one, so that its recorder sees what passes between them and a
-replay can put recorded reports and deliveries in their place; a study calls ``period`` and ``run_ideal``.
+Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell``, ``plan`` and
+``LISTS`` (whether beacons carry contacts).  A flight calls the four stages one by one, so that its recorder sees
+what passes between them and a replay can put recorded reports and deliveries in their place; a study calls
+``period`` and ``run_ideal``.
 Arrays have one row a vehicle:
 
     fleet VEHICLE, poses POSE, knowledge KNOWLEDGE, memory the planner's MEMORY, wishes WISH

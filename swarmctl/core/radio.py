@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .arrays import Floats, Integers, Records
+from .arrays import Integers, Records
 from .jit import allocating_kernel, kernel
 from .randoms import LOSS, uniform
 

@@ -108,7 +108,7 @@ class World:
         return len(self.scene.targets) + len(self.fleet) * int(self.rules[0]["alarm_slots"])
 
     def contacts_of(self, i: int) -> Records:
-        """What vehicle ``i`` remembers (K,) CONTACT, as it lies in memory (where it has forgotten nothing: in order)."""
+        """What vehicle ``i`` remembers (K,) CONTACT: in order, as long as it has forgotten nothing."""
         known: Records = self.contacts[i, : self.knowledge[i]["known"]]
         return known
 
