@@ -3,7 +3,7 @@
 Calling a kernel of the other modules directly would compile it anew in every process.
 """
 
-from . import geodesy, homing, randoms, scene, steering, wire
+from . import geodesy, homing, know, randoms, scene, steering, wire
 from .bind import compiled
 
 to_local = compiled(geodesy.to_local)
@@ -15,3 +15,4 @@ sort_into = compiled(scene.sort_into)
 order_home = compiled(homing.order_home)
 steer = compiled(steering.steer)
 read_poses = compiled(wire.read_poses)
+index = compiled(know.index)

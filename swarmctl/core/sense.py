@@ -11,6 +11,8 @@ from .arrays import Integers, Records
 from .jit import kernel
 from .randoms import ALARM, DETECT, NOISE, normal, uniform
 
+WANDER_REACH = 1.5  # how far off its place a wandering target can be, as a share of its swing: √2 at most
+
 
 @kernel
 def _report(reports: Records, count: int, i: int, serial: int, east: float, north: float) -> int:
@@ -52,13 +54,22 @@ def sense(
     reach = fleet[i].sensor_range
     x, y = poses[i].east, poses[i].north
     now = tick * rules[0].period
-    look = reach + 1.5 * grid[0].wander
-    first = scene.cell_of(grid, x - look, y - look)
-    last = scene.cell_of(grid, x + look, y + look)
-    width = last % grid[0].columns - first % grid[0].columns
+    look = reach + WANDER_REACH * grid[0].wander
+    here = scene.cell_of(grid, x, y)
+    around = grid[0].block
+    empty = starts[here, 1] == 0
+    if look > around * grid[0].cell:
+        around = int(look / grid[0].cell) + 1
+        empty = False
+    row, column = here // grid[0].columns, here % grid[0].columns
+    west, east = max(column - around, 0), min(column + around, grid[0].columns - 1)
+    south, north = max(row - around, 0), min(row + around, grid[0].rows - 1)
     count = 0
-    for corner in range(first, last - width + 1, grid[0].columns):
-        for t in range(starts[corner], starts[corner + width + 1]):
+    if empty:
+        north = south - 1  # no row to look through, as is mostly so
+    for r in range(south, north + 1):
+        first, last = r * grid[0].columns + west, r * grid[0].columns + east
+        for t in range(starts[first, 0], starts[last + 1, 0]):
             tx, ty = scene.place_at(grid, targets, t, now)
             if (tx - x) * (tx - x) + (ty - y) * (ty - y) > reach * reach:
                 continue
@@ -69,7 +80,8 @@ def sense(
             if noise > 0.0:
                 tx += noise * normal(seed, i, tick, NOISE + 2 * t)
                 ty += noise * normal(seed, i, tick, NOISE + 2 * t + 1)
-            count = _report(reports, count, i, t, tx, ty)
+            if count < reports.shape[1] - 1:  # room is kept for a false alarm
+                count = _report(reports, count, i, t, tx, ty)
             if found[t] < 0:
                 found[t] = tick
     if fleet[i].alarms_per_second > 0.0:

@@ -90,8 +90,9 @@ ERRAND = record(
 # One target: where it lies (or about where it wanders).
 TARGET = record("east", "north", "cluster", integers=("cluster",))
 
-# The grid that the targets, sorted by cell, are found through.
+# The grid that the targets, sorted by cell, are found through; whoever sees no further than `block` cells sees
+# nothing where there are no targets so many cells around.
 GRID = record(
-    "east", "north", "cell", "columns", "rows", "wander", "wander_speed",
-    integers=("columns", "rows"),
+    "east", "north", "cell", "columns", "rows", "block", "wander", "wander_speed",
+    integers=("columns", "rows", "block"),
 )  # fmt: skip

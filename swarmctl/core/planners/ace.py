@@ -14,6 +14,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "accurate coverage: mow every cluster found"
+LISTS = True
 PARAMETERS = (
     Parameter(
         "inertia",

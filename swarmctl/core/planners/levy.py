@@ -13,6 +13,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "baseline: a Lévy walk"
+LISTS = False
 PARAMETERS = (
     Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0, (0.0, 1.0)),
     Parameter(
