@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,14 @@ from .core.planners import MODULES
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from .mission.model import Mission
     from .record.folder import RunFolder
-    from .study.tune import Question, Told
+    from .study.tune import Question, Told, Trials
     from .study.tuned import Answer
 
 METRICS = ("t25", "t50", "t75", "t85", "t95", "final", "in_range")
 MOST_SEED, MOST_RUNS = 999_999, 1_000_000  # training and fresh seeds never meet
+Check = Callable[[], None]
 TRIALS, ANSWER, YAML = "trials.db", "tune.json", "planner.yaml"
 
 
@@ -70,19 +72,17 @@ def tune(
     Prints the planner section of a mission.  Parameters that the mission or --set gives are held.
     """
     with plain_errors(), ExitStack() as ending:
-        from .mission.load import load
         from .study.tune import Question
 
-        mission = load(mission_file, {**_settings(settings), "planner.algorithm": algorithm})
-        question = Question(mission, algorithm, metric, runs, seed)
+        question = Question(_mission(mission_file, algorithm, settings), algorithm, metric, runs, seed)
         folder = _folder(out, algorithm)
         ending.callback(folder.remove_if_empty)
         with (
-            stoppable(f"go on with: --out {folder.path}"),
+            stoppable(f"go on with: --out {folder.path}") as check,
             _alone(folder),
             _workers(workers, address) as executor,
         ):
-            found = _tune(question, trials, fresh, folder, executor)
+            found = _tune(question, trials, fresh, folder, executor, check)
         _write(found, folder)
         if as_json:
             click.echo(json.dumps(found.as_json(), indent=2, allow_nan=False))
@@ -90,17 +90,15 @@ def tune(
             click.echo(text(found), nl=False)
 
 
-def _settings(given: Sequence[str]) -> dict[str, object]:
-    """Dotted keys and their values, read as a mission file's."""
-    from .mission import yaml_reader
+def _mission(mission_file: Path | None, algorithm: str, sets: Sequence[str]) -> "Mission":
+    """The mission with what --set says over it; a study's, but that no key can vary."""
+    from .study.errors import StudyError
+    from .study.plan import make_plan
 
-    pairs: dict[str, object] = {}
-    for setting in given:
-        key, equals, value = setting.partition("=")
-        if not key or not equals:
-            raise click.UsageError(f"--set {setting}: write KEY=VALUE")
-        pairs[key] = yaml_reader.read(value.encode(), "command line").data
-    return pairs
+    plan = make_plan(mission_file, [algorithm], range(1), {}, sets)
+    if plan.varied:
+        raise StudyError(f"--set {plan.varied[0].key}: tuning is for one mission (give one value)")
+    return plan.cells[0].missions[algorithm]
 
 
 def _folder(out: Path | None, algorithm: str) -> "RunFolder":
@@ -143,15 +141,26 @@ def _workers(workers: int | None, address: str | None) -> "AbstractContextManage
 
 
 @contextmanager
-def stoppable(how_on: str) -> Iterator[None]:
-    """Ctrl-C (SIGTERM, or a closed terminal): stop, say how to go on, and exit as aborted."""
+def stoppable(how_on: str) -> Iterator[Check]:
+    """Ctrl-C (SIGTERM, or a closed terminal): stop, say how to go on, and exit as aborted.
 
-    def stop(*_: Any) -> None:
+    The interrupt may fall into a destructor or a callback of compiled code, which no exception leaves; so what is
+    given is to be called now and then, and stops what missed it.
+    """
+    asked: list[int] = []
+
+    def stop(number: int, frame: object) -> None:
+        asked.append(number)
         raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
 
     before: dict[int, Any] = {n: signal.signal(n, stop) for n in INTERRUPTIONS}
     try:
-        yield
+        yield check
+        check()
     except KeyboardInterrupt:
         say(f"stopped; what was finished is kept: {how_on}")
         sys.exit(ABORTED)
@@ -161,37 +170,40 @@ def stoppable(how_on: str) -> Iterator[None]:
 
 
 def _tune(
-    question: "Question", trials: int, fresh: int, folder: "RunFolder", executor: "Executor"
+    question: "Question", wanted: int, fresh: int, folder: "RunFolder", executor: "Executor", check: Check
 ) -> "Answer":
-    from .study import tune as tuning
+    from .study.tune import Trials
+    from .study.tune import tune as make_trials
     from .study.tuned import answer
 
-    study = tuning.open_trials(question, folder.path / TRIALS)
-    before = len(tuning.finished(study))
+    trials = Trials(question, folder.path / TRIALS)
+    before = f" ({len(trials.done)} of them are there already)" if trials.done else ""
     say(
-        f"tuning {question.algorithm} by {question.metric}: {trials} trials of {question.runs} runs, into {folder.path}"
-        + (f" ({before} of them are there already)" if before else "")
+        f"tuning {question.algorithm} by {question.metric}: {wanted} trials of {question.runs} runs, "
+        f"into {folder.path}{before}"
     )
-    with _progress(question, trials) as told:
-        tuning.tune(question, trials, study, executor, told)
-    return answer(question, study, fresh, executor, say)
+    with _progress(wanted, check) as told:
+        make_trials(trials, wanted, executor, told)
+    say(f"flying the default and the best setting on {fresh} fresh seeds")
+    return answer(trials, fresh, executor)
 
 
 @contextmanager
-def _progress(question: "Question", trials: int) -> "Iterator[Told]":
+def _progress(wanted: int, check: Check) -> "Iterator[Told]":
     """A bar on a terminal; else nothing, the command says what it begins and ends with."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from .study.tune import best_of
-
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("trials", total=trials)
+        task = bar.add_task("trials", total=wanted)
 
-        def told(done: Any) -> None:
-            number, score = best_of(question, done)
-            bar.update(task, completed=len(done), description=f"best: trial {number}, {score:.5g}")
+        def told(trials: "Trials") -> None:
+            check()
+            best = trials.best
+            bar.update(
+                task, completed=len(trials.done), description=f"best: trial {best}, {trials.score(best):.5g}"
+            )
 
         yield told
 

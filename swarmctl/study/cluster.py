@@ -115,8 +115,7 @@ def _agreed(client: "Client", address: str, say: Say) -> Code:
         ) from None
     found = client.run(code, on_error="return")
     expected = judge(found)
-    threads = sum(client.nthreads().values())
-    say(f"cluster at {address}: {len(found)} workers, {threads} threads, {expected[CPU]}")
+    say(f"cluster at {address}: {len(found)} workers, {expected[CPU]}")
     if expected[CPU] != code()[CPU]:
         say(f"this machine is {code()[CPU]}: here the same study may differ in the last digits")
     return expected
@@ -150,6 +149,7 @@ class _Checked(Executor):
         # pure=False: a key for each job, or a job that is asked for twice would be answered from memory.
         self._inner: Executor = client.get_executor(pure=False)
         self._expected = expected
+        self.threads = sum(client.nthreads().values())
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> "Future[T]":
         """Have ``fn`` called by a worker."""

@@ -11,7 +11,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import optuna
 import pytest
 import yaml
 from optuna.trial import TrialState
@@ -22,7 +21,7 @@ from swarmctl.mission.load import load
 from swarmctl.study import execute
 from swarmctl.study.errors import TuneError
 from swarmctl.study.runs import RUN, Job
-from swarmctl.study.tune import Question, best_of, finished, open_trials, setting_of, tune
+from swarmctl.study.tune import Question, Trials, tune
 from swarmctl.study.tuned import Answer, answer, fresh_seeds
 
 PLANTED = {"inertia": 0.85, "personal": 0.15}
@@ -69,19 +68,19 @@ def question(metric: str = "t85", runs: int = 20, seed: int = 3, **settings: obj
     return Question(load(settings={**SWARM, **settings}), "fco", metric, runs, seed)
 
 
-def trials_of(asked: Question, file: Path, count: int, executor: Executor) -> optuna.Study:
-    study = open_trials(asked, file)
-    tune(asked, count, study, executor, lambda done: None)
-    return study
+def trials_of(asked: Question, file: Path, count: int, executor: Executor) -> Trials:
+    trials = Trials(asked, file)
+    tune(trials, count, executor, lambda trials: None)
+    return trials
 
 
 def tuned(asked: Question, file: Path, count: int, executor: Executor) -> Answer:
-    return answer(asked, trials_of(asked, file, count, executor), 100, executor, lambda text: None)
+    return answer(trials_of(asked, file, count, executor), 100, executor)
 
 
-def told(study: optuna.Study) -> list[object]:
+def told(trials: Trials) -> list[object]:
     """Everything that the finished trials came to."""
-    return [(t.params, t.value, t.state, t.intermediate_values) for t in finished(study)]
+    return [(t.number, t.params, t.value, t.state, t.intermediate_values) for t in trials.done]
 
 
 @pytest.mark.parametrize("metric", ["t85", "final"])
@@ -98,8 +97,8 @@ def test_it_finds_the_planted_optimum(
 def test_the_first_trial_is_the_setting_without_tuning(
     valley: Valley, tmp_path: Path, executor: Executor
 ) -> None:
-    study = trials_of(question(), tmp_path / "t.db", 1, executor)
-    assert setting_of(finished(study)[0]) == {"inertia": 0.4, "personal": 0.4}
+    trials = trials_of(question(), tmp_path / "t.db", 1, executor)
+    assert trials.setting(0) == {"inertia": 0.4, "personal": 0.4}
     assert valley.flown[0].mission.planner.parameters["fco"] == {**HELD, "inertia": 0.4, "personal": 0.4}
 
 
@@ -119,9 +118,9 @@ def test_fresh_seeds_meet_no_training_and_no_usual_study() -> None:
 
 
 def test_the_answer_is_told_on_the_fresh_seeds(valley: Valley, tmp_path: Path, executor: Executor) -> None:
-    study = trials_of(question(), tmp_path / "t.db", 20, executor)
+    trials = trials_of(question(), tmp_path / "t.db", 20, executor)
     before = len(valley.flown)
-    got = answer(question(), study, 100, executor, lambda text: None)
+    got = answer(trials, 100, executor)
     seeds = [seed for job in valley.flown[before:] for seed in job.seeds]
     assert seeds == [*fresh_seeds(question(), 100)] * 2
     assert got.best.shape == got.default.shape == (100,)
@@ -141,7 +140,7 @@ def test_a_lead_that_was_luck_is_said_to_be_none(
 
     monkeypatch.setattr(execute, "simulate", lucky)
     got = tuned(asked, tmp_path / "t.db", 15, executor)
-    assert got.training_best < got.training_default
+    assert got.trials.score(got.trials.best) < got.trials.score(0)
     assert not got.is_better
     assert "NOT better" in got.verdict
 
@@ -149,44 +148,42 @@ def test_a_lead_that_was_luck_is_said_to_be_none(
 def test_a_default_that_nothing_beats_is_kept(valley: Valley, tmp_path: Path, executor: Executor) -> None:
     valley.depth = 0.0
     got = tuned(question(), tmp_path / "t.db", 5, executor)
-    assert got.best_trial == 0
+    assert got.trials.best == 0
     assert not got.is_better
     assert "keep the default" in got.verdict
 
 
-@pytest.mark.parametrize("stop_after", [0, 2, 5, 30, 63])
+@pytest.mark.parametrize("stop_after", [0, 2, 30])
 def test_interrupted_anywhere_it_goes_on_to_the_same_trials(
     stop_after: int, valley: Valley, tmp_path: Path, executor: Executor
 ) -> None:
-    whole = told(trials_of(question(), tmp_path / "whole.db", 25, executor))
+    whole = told(trials_of(question(), tmp_path / "whole.db", 15, executor))
     valley.flown.clear()
     valley.stop_after = stop_after
     with pytest.raises(KeyboardInterrupt):
-        trials_of(question(), tmp_path / "parts.db", 25, executor)
+        trials_of(question(), tmp_path / "parts.db", 15, executor)
     valley.stop_after = math.inf
-    parts = trials_of(question(), tmp_path / "parts.db", 25, executor)
+    parts = trials_of(question(), tmp_path / "parts.db", 15, executor)
     assert told(parts) == whole
-    assert parts.trials[-1].state in (TrialState.COMPLETE, TrialState.PRUNED)
+    assert told(Trials(question(), tmp_path / "parts.db")) == whole
 
 
 def test_more_trials_than_asked_for_are_not_made(valley: Valley, tmp_path: Path, executor: Executor) -> None:
     trials_of(question(), tmp_path / "t.db", 4, executor)
     before = len(valley.flown)
-    assert len(finished(trials_of(question(), tmp_path / "t.db", 3, executor))) == 4
+    assert len(trials_of(question(), tmp_path / "t.db", 3, executor).done) == 4
     assert len(valley.flown) == before
 
 
 def test_hopeless_trials_are_given_up_after_a_part(
     valley: Valley, tmp_path: Path, executor: Executor
 ) -> None:
-    study = trials_of(question(), tmp_path / "t.db", 30, executor)
-    pruned = [t for t in finished(study) if t.state == TrialState.PRUNED]
+    trials = trials_of(question(), tmp_path / "t.db", 30, executor)
+    pruned = [t for t in trials.done if t.state == TrialState.PRUNED]
     assert pruned
     flown = sum(len(job.seeds) for job in valley.flown)
     assert flown == 20 * (30 - len(pruned)) + sum(5 * (t.last_step or 0) for t in pruned)
-    assert best_of(question(), finished(study))[1] == min(
-        t.value for t in finished(study) if t.state == TrialState.COMPLETE and t.value is not None
-    )
+    assert trials.score(trials.best) == min(t.value for t in trials.done if t not in pruned and t.value)
 
 
 @pytest.mark.parametrize(
@@ -205,14 +202,14 @@ def test_trials_of_another_question_are_refused(
 ) -> None:
     trials_of(question(), tmp_path / "t.db", 1, executor)
     with pytest.raises(TuneError, match=rf"t\.db: holds trials with another .*{word}"):
-        open_trials(other, tmp_path / "t.db")
-    assert len(finished(open_trials(question(), tmp_path / "t.db"))) == 1
+        Trials(other, tmp_path / "t.db")
+    assert len(Trials(question(), tmp_path / "t.db").done) == 1
 
 
 def test_a_file_that_is_no_database_is_refused(tmp_path: Path) -> None:
     (tmp_path / "t.db").write_text("no database at all, but long enough to look like one" * 50)
     with pytest.raises(TuneError, match=r"t\.db: cannot be used for trials"):
-        open_trials(question(), tmp_path / "t.db")
+        Trials(question(), tmp_path / "t.db")
 
 
 def test_a_folder_may_be_called_anything(valley: Valley, tmp_path: Path, executor: Executor) -> None:
