@@ -24,6 +24,7 @@ from .console import (
     say,
 )
 from .core.planners import MODULES
+from .study_cli import study
 from .tune_cli import tune
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def main() -> None:
     """Search an area with a swarm of MAVLink vehicles, each with its own planner."""
 
 
+main.add_command(study)
 main.add_command(tune)
 
 algorithm_option = click.option(

@@ -63,7 +63,12 @@ class Study:
     @property
     def complete(self) -> bool:
         """Whether everything planned is finished."""
-        return all(len(done) == len(self.plan.algorithms) for done in self.runs)
+        return self.finished == self.plan.runs
+
+    @property
+    def finished(self) -> int:
+        """Runs of algorithms that are finished."""
+        return sum(len(records) for runs in self.runs for records in runs.values())
 
     @property
     def cells(self) -> list[tuple[Cell, dict[str, Records]]]:
