@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .study.plan import Cell, Plan
     from .study.study import Study
 
+Check = Callable[[], None]
 MOST_RUNS = 1_000_000
 PathArgument = click.Path(path_type=Path)
 
@@ -77,19 +78,19 @@ def study(
 
     Run k of every algorithm has the same layout.  A mission without dynamics is flown in ideal dynamics.
     """
-    with plain_errors(), stopping(), ExitStack() as ending:
+    with plain_errors(), stopping() as check, ExitStack() as ending:
         from .flight.fly import default_folder
         from .study.plan import make_plan
         from .study.study import Study
 
         flags = {"vehicles.count": vehicles, "duration_s": duration}
-        given = {key: value for key, value in flags.items() if value is not None}
+        given: dict[str, object] = {key: value for key, value in flags.items() if value is not None}
         under_way = Study(make_plan(mission_file, algorithms, range(seed, seed + runs), given, sets))
         folder = default_folder(out, "study")
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, address))
         try:
-            _fly(under_way, executor)
+            _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
             _keep(under_way, folder, as_json)
@@ -111,8 +112,12 @@ def executor_of(workers: int | None, address: str | None) -> "AbstractContextMan
 
 
 @contextmanager
-def stopping() -> Iterator[None]:
-    """Ctrl-C (SIGTERM, or a closed terminal) once: KeyboardInterrupt, and exit 4 after it; twice: exit 4 at once."""
+def stopping() -> Iterator[Check]:
+    """Ctrl-C (SIGTERM, or a closed terminal) once: KeyboardInterrupt, and exit 4 after it; twice: exit 4 at once.
+
+    The interrupt may fall into a destructor or a callback of compiled code, which no exception leaves; so what this
+    gives is to be called now and then, and raises KeyboardInterrupt if there was one.
+    """
     times = 0
 
     def stop(*_: Any) -> None:
@@ -122,9 +127,13 @@ def stopping() -> Iterator[None]:
             os._exit(ABORTED)  # threads that are in the middle of a run can be ended in no other way
         raise KeyboardInterrupt
 
+    def check() -> None:
+        if times:
+            raise KeyboardInterrupt
+
     before: dict[int, Any] = {number: signal.signal(number, stop) for number in INTERRUPTIONS}
     try:
-        yield
+        yield check
     except KeyboardInterrupt:
         sys.exit(ABORTED)
     finally:
@@ -132,19 +141,25 @@ def stopping() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _fly(under_way: "Study", executor: "Executor") -> None:
+def compiling(name: str) -> None:
+    """Say why nothing happens yet."""
+    say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
+
+
+def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     """Do the runs, and show how far they are."""
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
+    under_way.warm_up(compiling)
     say(_intention(plan))
     with _progress(plan) as (done, finished):
-        under_way.fly(executor, wall_s, done, finished)
+
+        def checked(runs: int) -> None:
+            check()
+            done(runs)
+
+        under_way.fly(executor, wall_s, checked, finished)
     steps = under_way.steps_per_s
     say(f"{plan.runs} runs in {under_way.wall_s:.1f} s: {steps / 1e6:.2f} million vehicle-steps a second")
 
