@@ -83,7 +83,7 @@ def study(
         from .study.study import Study
 
         flags = {"vehicles.count": vehicles, "duration_s": duration}
-        given = {key: value for key, value in flags.items() if value is not None}
+        given: dict[str, object] = {key: value for key, value in flags.items() if value is not None}
         under_way = Study(make_plan(mission_file, algorithms, range(seed, seed + runs), given, sets))
         folder = default_folder(out, "study")
         ending.callback(folder.remove_if_empty)
