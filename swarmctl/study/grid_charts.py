@@ -23,6 +23,7 @@ from .settings import Axis, shown_value
 from .statistics import summarise
 
 MOST_NUMBERS = 12  # more places than this along a side have no room for their numbers
+LONG_LABEL = 6  # characters; longer ones would meet if they lay flat
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,8 @@ def _draw_line(
 def heat_figure(name: str, axes: Sequence[Axis], cells: Sequence[CellFigures]) -> Figure:
     """Both measures of one algorithm over the first two keys, the best of the others' combinations at each."""
     across, up = axes[1], axes[0]
-    width = 2.2 + max(3.2, 0.62 * len(across.values))
-    height = 1.7 + max(2.4, 0.5 * len(up.values))
+    width = 2.2 + max(3.2, _side(across, 0.62))
+    height = 1.7 + max(2.4, _side(up, 0.5))
     figure = new_figure(2 * width, height)
     for panel, measure in zip(figure.subplots(1, 2), MEASURES, strict=True):
         _draw_heat(panel, measure, _best(name, measure, up, across, cells), up, across)
@@ -135,6 +136,11 @@ def heat_figure(name: str, axes: Sequence[Axis], cells: Sequence[CellFigures]) -
     note = f"; at each place the best of all {rest}" if rest else ""
     figure.suptitle(f"{name}{note}", color=INK, fontsize=13)
     return figure
+
+
+def _side(axis: Axis, with_number: float) -> float:
+    """Inches for the places along a side, less for each where numbers are left out."""
+    return (with_number if len(axis.values) <= MOST_NUMBERS else 0.32) * len(axis.values)
 
 
 def _best(name: str, measure: Measure, up: Axis, across: Axis, cells: Sequence[CellFigures]) -> Floats:
@@ -151,7 +157,9 @@ def _best(name: str, measure: Measure, up: Axis, across: Axis, cells: Sequence[C
 def _draw_heat(panel: Axes, measure: Measure, values: Floats, up: Axis, across: Axis) -> None:
     shades = "viridis_r" if measure.least_is_best else "viridis"
     image = panel.imshow(values, cmap=shades, aspect="auto", origin="lower")
-    panel.set_xticks(range(len(across.values)), [shown_value(value) for value in across.values])
+    labels = [shown_value(value) for value in across.values]
+    turned = 30 if max(map(len, labels)) > LONG_LABEL else 0
+    panel.set_xticks(range(len(labels)), labels, rotation=turned, ha="right" if turned else "center")
     panel.set_yticks(range(len(up.values)), [shown_value(value) for value in up.values])
     panel.set_xlabel(across.key, color=GREY)
     panel.set_ylabel(up.key, color=GREY)
