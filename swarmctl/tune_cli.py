@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import click
 
 from .console import ABORTED, BAD_INPUT, INTERRUPTIONS, plain_errors, say
 from .core.planners import MODULES
+from .study_cli import executor_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -80,7 +81,7 @@ def tune(
         with (
             stoppable(f"go on with: --out {folder.path}") as check,
             _alone(folder),
-            _workers(workers, address) as executor,
+            executor_of(workers, address) as executor,
         ):
             found = _tune(question, trials, fresh, folder, executor, check)
         _write(found, folder)
@@ -125,19 +126,6 @@ def _alone(folder: "RunFolder") -> Iterator[None]:
         sys.exit(BAD_INPUT)
     finally:
         os.close(lock)
-
-
-def _workers(workers: int | None, address: str | None) -> "AbstractContextManager[Executor]":
-    """Threads here, or a cluster."""
-    if address is None:
-        from .study.execute import local
-
-        return local(workers)
-    if workers is not None:
-        raise click.UsageError("--cluster has workers of its own: no --workers can be given")
-    from .study.cluster import cluster
-
-    return cluster(address, say)
 
 
 @contextmanager
