@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from .study.plan import Cell, Plan
     from .study.study import Study
 
-Check = Callable[[], None]
 MOST_RUNS = 1_000_000
 PathArgument = click.Path(path_type=Path)
+Check = Callable[[], None]
+"""Raises KeyboardInterrupt if somebody asked to stop."""
 
 
 class AlgorithmsType(click.ParamType):  # type: ignore[type-arg]
@@ -93,9 +94,9 @@ def study(
             _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
-            _keep(under_way, folder, as_json)
             raise
-        _keep(under_way, folder, as_json)
+        finally:  # whatever ended it, what is finished is kept
+            _keep(under_way, folder, as_json)
 
 
 def executor_of(workers: int | None, address: str | None) -> "AbstractContextManager[Executor]":
@@ -115,26 +116,26 @@ def executor_of(workers: int | None, address: str | None) -> "AbstractContextMan
 def stopping() -> Iterator[Check]:
     """Ctrl-C (SIGTERM, or a closed terminal) once: KeyboardInterrupt, and exit 4 after it; twice: exit 4 at once.
 
-    The interrupt may fall into a destructor or a callback of compiled code, which no exception leaves; so what this
-    gives is to be called now and then, and raises KeyboardInterrupt if there was one.
+    The first may fall into a destructor, which no exception leaves; so what is given is to be called now and then,
+    and stops what missed it.
     """
-    times = 0
+    asked: list[int] = []
 
-    def stop(*_: Any) -> None:
-        nonlocal times
-        times += 1
-        if times > 1:
+    def stop(number: int, frame: object) -> None:
+        asked.append(number)
+        if len(asked) > 1:
             os._exit(ABORTED)  # threads that are in the middle of a run can be ended in no other way
         raise KeyboardInterrupt
 
     def check() -> None:
-        if times:
+        if asked:
             raise KeyboardInterrupt
 
     before: dict[int, Any] = {number: signal.signal(number, stop) for number in INTERRUPTIONS}
     try:
         yield check
     except KeyboardInterrupt:
+        say("stopped")
         sys.exit(ABORTED)
     finally:
         for number, handler in before.items():
@@ -153,13 +154,8 @@ def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     plan = under_way.plan
     under_way.warm_up(compiling)
     say(_intention(plan))
-    with _progress(plan) as (done, finished):
-
-        def checked(runs: int) -> None:
-            check()
-            done(runs)
-
-        under_way.fly(executor, wall_s, checked, finished)
+    with _progress(plan, check) as (done, finished):
+        under_way.fly(executor, wall_s, done, finished)
     steps = under_way.steps_per_s
     say(f"{plan.runs} runs in {under_way.wall_s:.1f} s: {steps / 1e6:.2f} million vehicle-steps a second")
 
@@ -174,21 +170,26 @@ def _intention(plan: "Plan") -> str:
 
 
 @contextmanager
-def _progress(plan: "Plan") -> "Iterator[tuple[Callable[[int], None], Callable[[Cell, str], None]]]":
+def _progress(
+    plan: "Plan", check: Check
+) -> "Iterator[tuple[Callable[[int], None], Callable[[Cell, str], None]]]":
     """A bar on a terminal, a line for each algorithm that is finished elsewhere; on stderr."""
-    if not sys.stderr.isatty():
-        yield (lambda runs: None), (lambda cell, name: say(_finished(plan, cell, name)))
-        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("runs", total=plan.runs)
-        yield (
-            lambda runs: bar.update(task, advance=runs),
-            lambda cell, name: bar.console.print(_finished(plan, cell, name), markup=False, highlight=False),
-        )
+
+        def done(runs: int) -> None:
+            check()
+            bar.update(task, advance=runs)
+
+        def finished(cell: "Cell", name: str) -> None:
+            console.print(_finished(plan, cell, name), markup=False, highlight=False, soft_wrap=True)
+
+        yield done, finished
 
 
 def _finished(plan: "Plan", cell: "Cell", name: str) -> str:

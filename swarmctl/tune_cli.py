@@ -81,7 +81,7 @@ def tune(
                     _warm_up(plan)
                 found = _tune(question, trials, fresh, folder, executor, check)
         except KeyboardInterrupt:
-            say(f"stopped; what was finished is kept: go on with --out {folder.path}")
+            say(f"what was finished is kept: go on with --out {folder.path}")
             raise
         _write(found, folder)
         if as_json:

@@ -76,7 +76,7 @@ def test_a_tuning_that_was_ended_from_outside_goes_on(
         process.kill()
     if by != signal.SIGKILL:
         assert process.returncode == 4
-        assert said.splitlines()[-1] == f"stopped; what was finished is kept: go on with --out {out}"
+        assert said.splitlines()[-2:] == [f"what was finished is kept: go on with --out {out}", "stopped"]
     again = swarmctl(*options, out)
     assert again.exit_code == 0, again.stderr
     assert "of them are there already" in again.stderr
