@@ -111,7 +111,8 @@ async def _greet(address: str) -> None:
     from distributed.security import Security
 
     arguments = Security().get_connection_args("client")
-    greeted = await connect(address, timeout=CONNECT_S, **arguments)
+    # A time limit of our own: theirs ends with the connection, and somebody else's server may never say a word.
+    greeted = await asyncio.wait_for(connect(address, timeout=CONNECT_S, **arguments), CONNECT_S)
     await greeted.close()
 
 
