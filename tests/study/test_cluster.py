@@ -70,10 +70,18 @@ def worker(address: str, name: str, **settings: str) -> AbstractContextManager[s
     return started("dask", "worker", address, *options, **settings)
 
 
-@pytest.fixture
-def address(tmp_path: Path) -> Iterator[str]:
-    with scheduler(tmp_path) as (address, _):
+@pytest.fixture(scope="module")
+def lasting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with scheduler(tmp_path_factory.mktemp("scheduler")) as (address, _):
         yield address
+
+
+@pytest.fixture
+def address(lasting: str) -> str:
+    """A scheduler that has lost the workers of the test before."""
+    with Client(lasting) as client:
+        until(lambda: not client.nthreads())
+    return lasting
 
 
 def study(executor: execute.Executor, done: execute.Done = lambda runs: None) -> Records:
