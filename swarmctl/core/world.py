@@ -35,10 +35,11 @@ class Fences:
 
 def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander_mps: float = 0.0,
                reach_m: float = 200.0) -> Scene:  # fmt: skip
-    """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m`` (at most 256 × 256 cells)."""
+    """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m``, not much finer than there
+    are targets."""
     places = np.ascontiguousarray(places, np.float64)
     west, south, east, north = calls.bounds(places)
-    cell = max(reach_m, max(east - west, north - south) / 255.0)
+    cell = max(reach_m, max(east - west, north - south) / max(255.0, 2.0 * math.sqrt(len(places))))
     grid = np.zeros(1, state.GRID)
     columns, rows = int((east - west) // cell) + 1, int((north - south) // cell) + 1
     block = math.ceil((reach_m + WANDER_REACH * wander_m) / cell - 1e-9)
