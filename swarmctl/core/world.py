@@ -9,7 +9,7 @@ import numpy as np
 from . import bind, calls, planners, state
 from .arrays import Floats, Integers, Records
 from .guard import MOST_UNDER_WAY
-from .know import MOST_CONTACTS, MOST_PEERS
+from .know import LEAST_CONTACTS, MOST_CONTACTS, MOST_PEERS
 from .radio import MOST_HEARD
 from .sense import WANDER_REACH
 
@@ -83,14 +83,14 @@ class World:
         self.kernels: SimpleNamespace = bind.bind(algorithm)
         self.fleet, self.rules, self.settings = fleet, rules, settings
         self.scene, self.fences = scene, fences
-        remembered = power_of_two(min(self.serials, MOST_CONTACTS))
+        remembered = power_of_two(min(self.serials, max(MOST_CONTACTS // count, LEAST_CONTACTS)))
         self.poses = np.zeros(count, state.POSE)
         self.memory: Records = np.zeros(count, self.kernels.memory_dtype)
         self.knowledge = np.zeros(count, state.KNOWLEDGE)
         self.contacts = np.zeros((count, remembered), state.CONTACT)
         self.has: Integers = np.zeros((count, 2 * remembered), np.int64)
         self.told: Integers = np.zeros((count, power_of_two(min(count, MOST_PEERS))), np.int64)
-        self.reports = np.zeros((count, min(targets, MOST_CONTACTS) + 1), state.CONTACT)
+        self.reports = np.zeros((count, min(targets, max(remembered, LEAST_CONTACTS)) + 1), state.CONTACT)
         self.report_count: Integers = np.zeros(count, np.int64)
         self.alarms: Integers = np.zeros(count, np.int64)
         self.found: Integers = np.full(targets, -1, np.int64)
