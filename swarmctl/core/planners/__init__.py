@@ -13,6 +13,7 @@ MODULES = {
     "fco": "fco",
     "ace": "ace",
     "dpso-u": "dpso_u",
+    "belief": "belief",
     "bounce": "bounce",
     "levy": "levy",
     "sweep": "sweep",
