@@ -99,7 +99,7 @@ class Scenario:
         name = algorithm or self.mission.planner.algorithm
         scene = self.scene(seed)
         given = self.mission.planner.parameters.get(name, {})
-        settings = make_settings(name, {k: float(v) for k, v in given.items()})
+        settings = make_settings(name, given)
         world = World(
             name, self.fleet(seed), self.rules(seed, len(scene.targets)), scene, self.fences, settings
         )

@@ -17,6 +17,7 @@ from ..state import BEACON as COMMON_BEACON
 from ..state import COMMON_MEMORY, record
 from . import belief_choice as choice
 from . import belief_grid as grid
+from . import belief_end as end
 from . import common, sectors
 from .parameters import Parameter
 
@@ -36,21 +37,28 @@ PARAMETERS = (
     Parameter("arrival_s", 10.0, "time that every cell takes, beside the way there", "ours", 0.001),
     Parameter("turn_s", 4.0, "time that a turn takes, for each radian", "ours"),
     Parameter("decide_s", 3.0, "a new choice after so long, or on arrival", "ours"),
+    Parameter(
+        "then", "hold", "when little is left: search all over again, or converge on the densest known spot", "ours",
+        choices=("hold", "converge"),
+    ),
+    Parameter("enough", 0.05, "with converge: little is left where no cell is worth so much a second", "ours"),
     Parameter("patience", 3.0, "a goal is given up after so many times its straight flight", "ours", 1.0),
 )  # fmt: skip
 SETTLE_S = 30.0  # and so much on top, for short ways
-FIRST_LEG, SEARCH = 0, 1
+HOLD, CONVERGE = 0, 1
+FIRST_LEG, SEARCH, CONVERGING, LOST = 0, 1, 2, 3
+LOOK_S = 30.0  # between two looks for a spot that is denser yet
 _INTEGERS = (
-    "wide", "columns", "rows", "first_column", "first_row", "open_promising", "visited", "worth", "met", "mode",
-    "laid", "goal_row", "goal_column",
+    "wide", "columns", "rows", "first_column", "first_row", "visited", "worth", "ceilings", "met", "mode",
+    "laid", "goal_row", "goal_column", "round", "counted",
 )  # fmt: skip
 _OWN = record(
     *COMMON_MEMORY, "side", "mode", "laid", "was_east", "was_north", "goal_row", "goal_column", "decide_at",
-    "give_up_at", *sectors.FIELDS, *grid.FIELDS, *choice.FIELDS,
+    "give_up_at", "round", "counted", "spot_east", "spot_north", *sectors.FIELDS, *grid.FIELDS, *choice.FIELDS,
     integers=_INTEGERS,
 )  # fmt: skip
 MEMORY = np.dtype([*_OWN.descr, ("cells", "<i1", (grid.STRIDE * grid.STRIDE,))])
-_TOLD = record("first_column", "first_row", ("visited", grid.SIDE), *choice.FIELDS, integers=_INTEGERS)
+_TOLD = record("round", "first_column", "first_row", ("visited", grid.SIDE), *choice.FIELDS, integers=_INTEGERS)
 BEACON = np.dtype([*COMMON_BEACON.descr, *_TOLD.descr])
 LONG_AGO = -1e9
 
@@ -59,7 +67,8 @@ LONG_AGO = -1e9
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
     """Agree on the sectors; cells are laid at the first step, where the settings are at hand."""
     sectors.agree(memory, i, fleet, edges)
-    memory[i].mode, memory[i].laid, memory[i].goal_row = FIRST_LEG, 0, -1
+    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].round, memory[i].counted = FIRST_LEG, 0, -1, 0, 0
+    memory[i].decide_at, memory[i].give_up_at, memory[i].side = 0.0, 0.0, 0.0
     for k in range(choice.MET):
         memory[i].met_at[k] = LONG_AGO
 
@@ -84,6 +93,8 @@ def _lay_out(memory: Records, i: int, fleet: Records, poses: Records, edges: Flo
     grid.lay_cells(memory, i, fleet, edges, settings[0].cell, settings[0].cell_most)
     grid.centre_window(memory, i, poses[i].east, poses[i].north)
     memory[i].was_east, memory[i].was_north = poses[i].east, poses[i].north
+    for row in range(grid.SIDE):
+        memory[i].visited[row] = 0
     memory[i].laid = 1
 
 
@@ -105,10 +116,11 @@ def _hear(
     memory: Records, i: int, beacons: Records, heard: Integers, count: int, slot: int, sent_at: float,
     places: int,
 ) -> None:  # fmt: skip
-    """Take over the maps of those heard, and whom they met."""
+    """Take over the maps of those heard that are of this round, and whom they met."""
     for h in range(count):
         j = heard[slot, i, h]
-        grid.take_over(memory, i, beacons, slot, j)
+        if beacons[slot, j].round == memory[i].round:
+            grid.take_over(memory, i, beacons, slot, j)
         choice.meet(memory, i, j, sent_at, beacons[slot, j].east, beacons[slot, j].north)
         for k in range(places):
             choice.meet(
@@ -144,16 +156,58 @@ def _goal_is_open(memory: Records, i: int) -> bool:
 
 
 @kernel
+def _begin_round(
+    memory: Records, i: int, fleet: Records, knowledge: Records, contacts: Records, edges: Floats, settings: Records,
+    number: int,
+) -> None:  # fmt: skip
+    """Search all over again, as if nothing had been visited."""
+    memory[i].round = number
+    for row in range(grid.SIDE):
+        memory[i].visited[row] = 0
+    reach = settings[0].near_target * fleet[i].sensor_range
+    grid.fill_window(memory, i, edges, contacts, knowledge[i].known, reach)
+
+
+@kernel
+def _latest_round(memory: Records, i: int, beacons: Records, heard: Integers, count: int, slot: int) -> int:
+    """The latest round that anybody heard is in, this vehicle included."""
+    latest = memory[i].round
+    for h in range(count):
+        latest = max(latest, beacons[slot, heard[slot, i, h]].round)
+    return int(latest)
+
+
+@kernel
+def _converge(
+    memory: Records, i: int, fleet: Records, knowledge: Records, contacts: Records, edges: Floats, rules: Records,
+    now: float,
+) -> None:  # fmt: skip
+    """Look for the densest spot, if more is known than at the last look."""
+    if now < memory[i].decide_at or knowledge[i].known == memory[i].counted:
+        return
+    memory[i].decide_at, memory[i].counted = now + LOOK_S, knowledge[i].known
+    east, north = end.densest(contacts, i, knowledge[i].known, fleet[i].sensor_range)
+    east, north = end.own_place(i, rules[0].separation, edges, east, north)
+    memory[i].spot_east, memory[i].spot_north = east, north
+
+
+@kernel
 def _decide(
     memory: Records, i: int, fleet: Records, poses: Records, settings: Records, now: float, fresh: bool
-) -> None:
-    """Choose a goal; ``fresh``: what became of the last one is no reason to give this one less time."""
+) -> float:
+    """Choose a goal and return what it is worth a second.
+
+    ``fresh``: what became of the last goal is no reason to give this one less time.
+    """
     if not fresh and now > memory[i].give_up_at:
         grid.give_up(
             memory, i, memory[i].goal_row - memory[i].first_row, memory[i].goal_column - memory[i].first_column
         )
         fresh = True
-    row, column, _ = choice.choose(memory, i, fleet, poses, settings, now)
+    row, column = grid.row_at(memory, i, poses[i].north), grid.column_at(memory, i, poses[i].east)
+    if _goal_is_open(memory, i):
+        row, column = memory[i].goal_row - memory[i].first_row, memory[i].goal_column - memory[i].first_column
+    row, column, best = choice.choose(memory, i, fleet, poses, settings, now, row, column)
     memory[i].decide_at = now + settings[0].decide_s
     memory[i].goal_row = row + memory[i].first_row if row >= 0 else -1
     memory[i].goal_column = column + memory[i].first_column
@@ -162,6 +216,38 @@ def _decide(
         dy = grid.north_of(memory, i, row) - poses[i].north
         flight = math.sqrt(dx * dx + dy * dy) / fleet[i].speed
         memory[i].give_up_at = now + SETTLE_S + settings[0].patience * flight
+    return float(best)
+
+
+@kernel
+def _search(
+    memory: Records, i: int, fleet: Records, poses: Records, knowledge: Records, contacts: Records, edges: Floats,
+    settings: Records, now: float, progress: bool,
+) -> None:  # fmt: skip
+    """Choose anew on arrival or after a while; where little or nothing is left, do what ``then`` says."""
+    is_open = _goal_is_open(memory, i)
+    if is_open and now < memory[i].decide_at:
+        return
+    best = _decide(memory, i, fleet, poses, settings, now, progress or not is_open)
+    if settings[0].then == CONVERGE and best < 1000.0 * settings[0].enough and knowledge[i].known > 0:
+        memory[i].mode, memory[i].decide_at = CONVERGING, now
+    elif memory[i].goal_row < 0:
+        _begin_round(memory, i, fleet, knowledge, contacts, edges, settings, memory[i].round + 1)
+        _decide(memory, i, fleet, poses, settings, now, True)
+        if memory[i].goal_row < 0:
+            memory[i].mode = LOST
+
+
+@kernel
+def _head(memory: Records, i: int, poses: Records, edges: Floats, reach: float) -> None:
+    """Aim at the goal or the spot, round what is in the way; without either, straight on."""
+    if memory[i].mode == SEARCH:
+        column, row = memory[i].goal_column - memory[i].first_column, memory[i].goal_row - memory[i].first_row
+        common.aim_at(memory, i, poses, grid.east_of(memory, i, column), grid.north_of(memory, i, row))
+        common.pass_by(memory, i, poses, edges, reach)
+    elif memory[i].mode == CONVERGING:
+        common.aim_at(memory, i, poses, memory[i].spot_east, memory[i].spot_north)
+        common.pass_by(memory, i, poses, edges, reach)
 
 
 @kernel
@@ -173,29 +259,31 @@ def step(
     """One period of vehicle ``i``: turn the heading in its memory (see loop.decide for the arguments)."""
     now = tick * rules[0].period
     reach = common.look_ahead(fleet, i, rules)
+    count = heard_count[slot, i]
     progress = _learn(memory, i, fleet, poses, knowledge, contacts, edges, settings)
+    latest = _latest_round(memory, i, beacons, heard, count, slot)
+    if latest > memory[i].round:
+        _begin_round(memory, i, fleet, knowledge, contacts, edges, settings, latest)
     sent_at = now - rules[0].radio_delay * rules[0].period
-    _hear(
-        memory, i, beacons, heard, heard_count[slot, i], slot, sent_at, min(fleet.shape[0], choice.MET)
-    )
+    _hear(memory, i, beacons, heard, count, slot, sent_at, min(fleet.shape[0], choice.MET))
     if memory[i].mode == FIRST_LEG and (
         knowledge[i].in_range > 0 or common.blocked(memory, i, poses, edges, reach)
     ):
         memory[i].mode = SEARCH
-    if memory[i].mode != FIRST_LEG:
-        is_open = _goal_is_open(memory, i)
-        if not is_open or now >= memory[i].decide_at:
-            _decide(memory, i, fleet, poses, settings, now, progress or not is_open)
-    if memory[i].goal_row >= 0:
-        column, row = memory[i].goal_column - memory[i].first_column, memory[i].goal_row - memory[i].first_row
-        common.aim_at(memory, i, poses, grid.east_of(memory, i, column), grid.north_of(memory, i, row))
-        common.pass_by(memory, i, poses, edges, reach)
+    if memory[i].mode == SEARCH:
+        _search(memory, i, fleet, poses, knowledge, contacts, edges, settings, now, progress)
+    if memory[i].mode == CONVERGING:
+        _converge(memory, i, fleet, knowledge, contacts, edges, rules, now)
+        if end.approach(memory, i, fleet, poses, edges, rules, memory[i].spot_east, memory[i].spot_north):
+            return
+    _head(memory, i, poses, edges, reach)
     common.respond_to_fence(memory, i, poses, fleet, edges, rules, tick, settings[0].inertia)
 
 
 @kernel
 def tell(memory: Records, i: int, beacons: Records, slot: int) -> None:
-    """The map and the table of the vehicles met."""
+    """The map, its round, and the table of the vehicles met."""
+    beacons[slot, i].round = memory[i].round
     beacons[slot, i].first_column = memory[i].first_column
     beacons[slot, i].first_row = memory[i].first_row
     for row in range(grid.SIDE):

@@ -1,8 +1,8 @@
 """How a vehicle that flies ``belief`` chooses where to fly next: the cell that is worth most for the time it takes.
 
-Worth lies in the cells (belief_grid), and a goal has that of the 3 × 3 cells about it.  Cells are looked at outwards
-from the vehicle, ring by ring, until none further out could be worth more, whatever lay there; ties go to the cell
-with the lower number.  So the choice is that of looking at all cells, in any order.
+Worth lies in the cells (belief_grid), and a goal has that of the 3 × 3 cells about it.  Blocks of cells have ceilings
+on what a goal in them can be worth; those where even that, at the block's nearest corner, would not be enough are
+passed over.  Ties go to the cell with the lower number.  So the choice is that of looking at all cells in any order.
 """
 
 import math
@@ -11,6 +11,7 @@ from ..arrays import Records
 from ..jit import kernel
 from . import belief_grid as grid
 
+SLACK = 1.0 - 1e-9  # for what rounding adds to a distance
 MET = 32  # places in the table of the vehicles met
 FIELDS = (
     ("met", MET), ("met_at", MET), ("met_east", MET), ("met_north", MET),
@@ -50,10 +51,9 @@ def _block(memory: Records, i: int, k: int) -> int:
 @kernel
 def _value(
     memory: Records, i: int, fleet: Records, poses: Records, settings: Records, now: float, row: int,
-    column: int, least: float,
+    column: int, total: int, least: float,
 ) -> float:  # fmt: skip
-    """Worth (thousandths) a second of a cell; 0 for one that turns out to be under ``least``."""
-    total = _block(memory, i, grid.place(row, column))
+    """Worth a second of a cell whose block is worth ``total``; 0 for one that turns out to be under ``least``."""
     east, north = grid.east_of(memory, i, column), grid.north_of(memory, i, row)
     dx, dy = east - poses[i].east, north - poses[i].north
     distance = math.sqrt(dx * dx + dy * dy)
@@ -78,26 +78,63 @@ def _turned(memory: Records, i: int, x: float, y: float) -> tuple[float, float]:
 
 
 @kernel
+def _away(low: float, value: float, high: float) -> float:
+    """How far a number lies outside of an interval."""
+    return max(low - value, 0.0, value - high)
+
+
+@kernel
+def _least_time(memory: Records, i: int, fleet: Records, poses: Records, settings: Records, block: int) -> float:
+    """Less time (s) than any cell of a block takes."""
+    row, column = grid.BLOCK * (block // grid.BLOCKS), grid.BLOCK * (block % grid.BLOCKS)
+    side = (grid.BLOCK - 1) * memory[i].cell
+    west, south = grid.east_of(memory, i, column), grid.north_of(memory, i, row)
+    x, y = _away(west, poses[i].east, west + side), _away(south, poses[i].north, south + side)
+    return float(SLACK * math.sqrt(x * x + y * y) / fleet[i].speed + settings[0].arrival_s)
+
+
+@kernel
+def _search_block(
+    memory: Records, i: int, fleet: Records, poses: Records, settings: Records, now: float, block: int,
+    best: float, best_row: int, best_column: int,
+) -> tuple[float, int, int]:  # fmt: skip
+    """The best so far, or a better cell of the block; what the block's best is worth becomes its ceiling."""
+    first_row, first_column = grid.BLOCK * (block // grid.BLOCKS), grid.BLOCK * (block % grid.BLOCKS)
+    ceiling = 0
+    for row in range(first_row, first_row + grid.BLOCK):
+        if memory[i].visited[row] >> first_column & grid.BLOCK_BITS == grid.BLOCK_BITS:
+            continue
+        for column in range(first_column, first_column + grid.BLOCK):
+            k = grid.place(row, column)
+            if memory[i].cells[k] >= grid.CLOSED:
+                continue
+            total = _block(memory, i, k)
+            ceiling = max(ceiling, total)
+            value = _value(memory, i, fleet, poses, settings, now, row, column, total, best)
+            lower = row < best_row or (row == best_row and column < best_column)
+            if value > best or (value == best and value > 0.0 and lower):
+                best, best_row, best_column = value, row, column
+    memory[i].ceilings[block] = ceiling
+    return best, best_row, best_column
+
+
+@kernel
 def choose(
-    memory: Records, i: int, fleet: Records, poses: Records, settings: Records, now: float
-) -> tuple[int, int, float]:
-    """Row and column in the window of the best cell, and its worth a second; a row of -1 where there is none."""
-    rows, columns = grid.rows_of(memory, i), grid.columns_of(memory, i)
-    row_0 = grid.row_at(memory, i, poses[i].north)
-    column_0 = grid.column_at(memory, i, poses[i].east)
-    highest = 9 * (memory[i].worth[grid.PROMISING] if memory[i].open_promising > 0 else memory[i].worth[grid.OWN])
-    best, best_row, best_column = 0.0, -1, -1
-    for ring in range(max(rows, columns)):
-        nearest = max(ring - 0.5, 0.0) * memory[i].cell
-        if highest / (nearest / fleet[i].speed + settings[0].arrival_s) < best:
-            break
-        for row in range(max(row_0 - ring, 0), min(row_0 + ring, rows - 1) + 1):
-            step = 1 if abs(row - row_0) == ring else 2 * ring
-            for column in range(column_0 - ring, column_0 + ring + 1, step):
-                if not 0 <= column < columns or memory[i].cells[grid.place(row, column)] >= grid.CLOSED:
-                    continue
-                value = _value(memory, i, fleet, poses, settings, now, row, column, best)
-                lower = row < best_row or (row == best_row and column < best_column)
-                if value > best or (value == best and value > 0.0 and lower):
-                    best, best_row, best_column = value, row, column
-    return best_row, best_column, best
+    memory: Records, i: int, fleet: Records, poses: Records, settings: Records, now: float, row: int,
+    column: int,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Row and column in the window of the best cell, and its worth a second; a row of -1 where there is none.
+
+    It is looked for about the given cell first: the sooner a good one is found, the more blocks are passed over.
+    """
+    first = grid.block_of(row, column)
+    best, row, column = _search_block(memory, i, fleet, poses, settings, now, first, 0.0, -1, -1)
+    for block in range(grid.BLOCKS * grid.BLOCKS):
+        ceiling = memory[i].ceilings[block]
+        if ceiling == 0 or block == first or ceiling < SLACK * best * settings[0].arrival_s:
+            continue
+        if ceiling / _least_time(memory, i, fleet, poses, settings, block) >= best:
+            best, row, column = _search_block(
+                memory, i, fleet, poses, settings, now, block, best, row, column
+            )
+    return row, column, best

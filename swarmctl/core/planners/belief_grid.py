@@ -20,6 +20,9 @@ from . import sectors
 SIDE = 60  # cells of a window a side; a row's bits and its sign fit one word
 STRIDE = 64
 BORDER = 2
+BLOCK = 4  # cells of a block a side
+BLOCKS = SIDE // BLOCK  # blocks of a window a side
+BLOCK_BITS = (1 << BLOCK) - 1
 MARGIN = 12  # cells from the window's edge at which it is moved
 
 # What a cell is.  Unknown cells count their empty neighbours, up to 25.
@@ -30,8 +33,8 @@ EMPTY, RICH = 65, 66  # visited, with no target near or with some
 BARRED = 67  # out of bounds, or given up
 CODES = 68
 FIELDS = (
-    "cell", "west", "south", "columns", "rows", "first_column", "first_row", "open_promising",
-    ("visited", SIDE), ("worth", CODES),
+    "cell", "west", "south", "columns", "rows", "first_column", "first_row",
+    ("visited", SIDE), ("worth", CODES), ("ceilings", BLOCKS * BLOCKS),
 )  # fmt: skip
 
 
@@ -140,7 +143,9 @@ def fill_window(
             if (legal >> column) & 1:
                 ours = sectors.own(memory, i, east_of(memory, i, column), north_of(memory, i, row))
                 cells[place(row, column)] = OWN if ours else FOREIGN
-    memory[i].open_promising = 0
+    for block in range(BLOCKS * BLOCKS):
+        inside = block // BLOCKS * BLOCK < rows_of(memory, i) and block % BLOCKS * BLOCK < columns_of(memory, i)
+        memory[i].ceilings[block] = 9 * memory[i].worth[PROMISING] if inside else 0
     for row in range(SIDE):
         word = memory[i].visited[row]
         memory[i].visited[row] = 0
@@ -200,7 +205,6 @@ def visit_row(memory: Records, i: int, row: int, word: int) -> bool:
                 _count(cells, k, 1)
             elif cells[k] == PROMISING:
                 cells[k] = RICH
-                memory[i].open_promising -= 1
     return True
 
 
@@ -208,8 +212,6 @@ def visit_row(memory: Records, i: int, row: int, word: int) -> bool:
 def give_up(memory: Records, i: int, row: int, column: int) -> None:
     """Bar a cell that proved out of reach, for this vehicle alone."""
     k = place(row, column)
-    if memory[i].cells[k] == PROMISING:
-        memory[i].open_promising -= 1
     if memory[i].cells[k] < CLOSED:
         memory[i].cells[k] = BARRED
 
@@ -233,6 +235,21 @@ def visit(memory: Records, i: int, east: float, north: float, reach: float) -> b
 
 
 @kernel
+def block_of(row: int, column: int) -> int:
+    """The number of the block in which a cell of the window lies."""
+    return (row // BLOCK) * BLOCKS + column // BLOCK
+
+
+@kernel
+def _raise_ceilings(memory: Records, i: int, row: int, column: int) -> None:
+    """Where a cell's worth rose, that of goals up to three cells off may have."""
+    highest = 9 * memory[i].worth[PROMISING]
+    for r in range(max(row - 3, 0) // BLOCK, min(row + 3, SIDE - 1) // BLOCK + 1):
+        for c in range(max(column - 3, 0) // BLOCK, min(column + 3, SIDE - 1) // BLOCK + 1):
+            memory[i].ceilings[r * BLOCKS + c] = highest
+
+
+@kernel
 def promise(memory: Records, i: int, east: float, north: float, reach: float) -> None:
     """Mark the cells with their centre within ``reach`` of a target promising."""
     cells = memory[i].cells
@@ -248,7 +265,7 @@ def promise(memory: Records, i: int, east: float, north: float, reach: float) ->
                 _count(cells, k, -1)
             else:
                 cells[k] = PROMISING
-                memory[i].open_promising += 1
+            _raise_ceilings(memory, i, row, column)
 
 
 @kernel
