@@ -50,15 +50,15 @@ FIRST_LEG, SEARCH, CONVERGING, LOST = 0, 1, 2, 3
 LOOK_S = 30.0  # between two looks for a spot that is denser yet
 _INTEGERS = (
     "wide", "columns", "rows", "first_column", "first_row", "visited", "worth", "ceilings", "met", "mode",
-    "laid", "goal_row", "goal_column", "round", "counted",
+    "laid", "goal_row", "goal_column", "lap", "counted",
 )  # fmt: skip
 _OWN = record(
     *COMMON_MEMORY, "side", "mode", "laid", "was_east", "was_north", "goal_row", "goal_column", "decide_at",
-    "give_up_at", "round", "counted", "spot_east", "spot_north", *sectors.FIELDS, *grid.FIELDS, *choice.FIELDS,
+    "give_up_at", "lap", "counted", "spot_east", "spot_north", *sectors.FIELDS, *grid.FIELDS, *choice.FIELDS,
     integers=_INTEGERS,
 )  # fmt: skip
 MEMORY = np.dtype([*_OWN.descr, ("cells", "<i1", (grid.STRIDE * grid.STRIDE,))])
-_TOLD = record("round", "first_column", "first_row", ("visited", grid.SIDE), *choice.FIELDS, integers=_INTEGERS)
+_TOLD = record("lap", "first_column", "first_row", ("visited", grid.SIDE), *choice.FIELDS, integers=_INTEGERS)
 BEACON = np.dtype([*COMMON_BEACON.descr, *_TOLD.descr])
 LONG_AGO = -1e9
 
@@ -67,7 +67,7 @@ LONG_AGO = -1e9
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
     """Agree on the sectors; cells are laid at the first step, where the settings are at hand."""
     sectors.agree(memory, i, fleet, edges)
-    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].round, memory[i].counted = FIRST_LEG, 0, -1, 0, 0
+    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].lap, memory[i].counted = FIRST_LEG, 0, -1, 0, 0
     memory[i].decide_at, memory[i].give_up_at, memory[i].side = 0.0, 0.0, 0.0
     for k in range(choice.MET):
         memory[i].met_at[k] = LONG_AGO
@@ -116,10 +116,10 @@ def _hear(
     memory: Records, i: int, beacons: Records, heard: Integers, count: int, slot: int, sent_at: float,
     places: int,
 ) -> None:  # fmt: skip
-    """Take over the maps of those heard that are of this round, and whom they met."""
+    """Take over the maps of those heard that are of this lap, and whom they met."""
     for h in range(count):
         j = heard[slot, i, h]
-        if beacons[slot, j].round == memory[i].round:
+        if beacons[slot, j].lap == memory[i].lap:
             grid.take_over(memory, i, beacons, slot, j)
         choice.meet(memory, i, j, sent_at, beacons[slot, j].east, beacons[slot, j].north)
         for k in range(places):
@@ -156,12 +156,12 @@ def _goal_is_open(memory: Records, i: int) -> bool:
 
 
 @kernel
-def _begin_round(
+def _begin_lap(
     memory: Records, i: int, fleet: Records, knowledge: Records, contacts: Records, edges: Floats, settings: Records,
     number: int,
 ) -> None:  # fmt: skip
     """Search all over again, as if nothing had been visited."""
-    memory[i].round = number
+    memory[i].lap = number
     for row in range(grid.SIDE):
         memory[i].visited[row] = 0
     reach = settings[0].near_target * fleet[i].sensor_range
@@ -169,11 +169,11 @@ def _begin_round(
 
 
 @kernel
-def _latest_round(memory: Records, i: int, beacons: Records, heard: Integers, count: int, slot: int) -> int:
-    """The latest round that anybody heard is in, this vehicle included."""
-    latest = memory[i].round
+def _latest_lap(memory: Records, i: int, beacons: Records, heard: Integers, count: int, slot: int) -> int:
+    """The latest lap that anybody heard is in, this vehicle included."""
+    latest = memory[i].lap
     for h in range(count):
-        latest = max(latest, beacons[slot, heard[slot, i, h]].round)
+        latest = max(latest, beacons[slot, heard[slot, i, h]].lap)
     return int(latest)
 
 
@@ -232,7 +232,7 @@ def _search(
     if settings[0].then == CONVERGE and best < 1000.0 * settings[0].enough and knowledge[i].known > 0:
         memory[i].mode, memory[i].decide_at = CONVERGING, now
     elif memory[i].goal_row < 0:
-        _begin_round(memory, i, fleet, knowledge, contacts, edges, settings, memory[i].round + 1)
+        _begin_lap(memory, i, fleet, knowledge, contacts, edges, settings, memory[i].lap + 1)
         _decide(memory, i, fleet, poses, settings, now, True)
         if memory[i].goal_row < 0:
             memory[i].mode = LOST
@@ -261,9 +261,9 @@ def step(
     reach = common.look_ahead(fleet, i, rules)
     count = heard_count[slot, i]
     progress = _learn(memory, i, fleet, poses, knowledge, contacts, edges, settings)
-    latest = _latest_round(memory, i, beacons, heard, count, slot)
-    if latest > memory[i].round:
-        _begin_round(memory, i, fleet, knowledge, contacts, edges, settings, latest)
+    latest = _latest_lap(memory, i, beacons, heard, count, slot)
+    if latest > memory[i].lap:
+        _begin_lap(memory, i, fleet, knowledge, contacts, edges, settings, latest)
     sent_at = now - rules[0].radio_delay * rules[0].period
     _hear(memory, i, beacons, heard, count, slot, sent_at, min(fleet.shape[0], choice.MET))
     if memory[i].mode == FIRST_LEG and (
@@ -282,8 +282,8 @@ def step(
 
 @kernel
 def tell(memory: Records, i: int, beacons: Records, slot: int) -> None:
-    """The map, its round, and the table of the vehicles met."""
-    beacons[slot, i].round = memory[i].round
+    """The map, its lap, and the table of the vehicles met."""
+    beacons[slot, i].lap = memory[i].lap
     beacons[slot, i].first_column = memory[i].first_column
     beacons[slot, i].first_row = memory[i].first_row
     for row in range(grid.SIDE):
