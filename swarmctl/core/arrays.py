@@ -7,5 +7,4 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Flags = NDArray[np.uint8]
 Records = NDArray[Any]  # a structured array; its dtype is named in core/state.py

@@ -30,7 +30,10 @@ from numba.core.bytecode import FunctionIdentity
 from . import loop, planners, state
 
 F = TypeVar("F", bound=Callable[..., object])
-BOUND = ("prepare", "observe", "share", "deliver", "decide", "period", "run_ideal", "run_multicopter")
+# Callees first.  Those of a period are copied into what calls them: handing on their twenty arrays costs more than
+# they do.
+IN_A_PERIOD = ("observe", "share", "deliver", "decide", "period")
+BOUND = ("prepare", *IN_A_PERIOD, "run_ideal", "run_multicopter")
 _OWN_NUMBER_BYTES = 6
 _NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
 
@@ -58,10 +61,12 @@ def cache_folder() -> Path:
     return folder
 
 
-def _compile(function: Callable[..., Any], name: str, free: dict[str, Any]) -> Any:
+def _compile(function: Callable[..., Any], name: str, free: dict[str, Any], inline: bool = False) -> Any:
     bound = FunctionType(function.__code__, {**function.__globals__, **free}, name)
     bound.__qualname__ = name  # Numba's cache index goes by it
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(bound)
+    # Without Numba's runtime: see jit.kernel.
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": inline}
+    return numba.njit(cache=True, **options)(bound)
 
 
 @cache
@@ -87,8 +92,11 @@ def bind(name: str) -> SimpleNamespace:
     _use_cache()
     module = planners.module(name)
     free: dict[str, Any] = {"start": module.start, "tell": module.tell, "plan": module.step}
+    free["LISTS"] = module.LISTS
     for entry in BOUND:
-        free[entry] = _compile(getattr(loop, entry), f"{entry}_{name.replace('-', '_')}", free)
+        free[entry] = _compile(
+            getattr(loop, entry), f"{entry}_{name.replace('-', '_')}", free, entry in IN_A_PERIOD
+        )
     beacon = getattr(module, "BEACON", state.BEACON)
     return SimpleNamespace(memory_dtype=module.MEMORY, beacon_dtype=beacon, **free)
 

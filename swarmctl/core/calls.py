@@ -3,15 +3,18 @@
 Calling a kernel of the other modules directly would compile it anew in every process.
 """
 
-from . import geodesy, homing, randoms, scene, steering, wire
+from . import geodesy, homing, know, randoms, scene, steering, wire
 from .bind import compiled
 
 to_local = compiled(geodesy.to_local)
 to_geodetic = compiled(geodesy.to_geodetic)
 uniform = compiled(randoms.uniform)
+uniforms = compiled(randoms.uniforms)
 place_centres = compiled(scene.place_centres)
 lay_out = compiled(scene.lay_out)
+bounds = compiled(scene.bounds)
 sort_into = compiled(scene.sort_into)
 order_home = compiled(homing.order_home)
 steer = compiled(steering.steer)
 read_poses = compiled(wire.read_poses)
+index = compiled(know.index)

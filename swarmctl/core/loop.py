@@ -1,25 +1,30 @@
 """The loop: sense → know ⇄ radio → plan, once a planner period, for every vehicle.
 
-Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell`` and
-``plan``.  A flight calls the four stages one by one, so that its recorder sees what passes between them and a
-replay can put recorded reports and deliveries in their place; a study calls ``period`` and ``run_ideal``.
+Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell``, ``plan`` and
+``LISTS`` (whether beacons carry contacts).  A flight calls the four stages one by one, so that its recorder sees
+what passes between them and a replay can put recorded reports and deliveries in their place; a study calls
+``period`` and ``run_ideal``.
 Arrays have one row a vehicle:
 
     fleet VEHICLE, poses POSE, knowledge KNOWLEDGE, memory the planner's MEMORY, wishes WISH
-    contacts (V, C) CONTACT          what each vehicle knows, in the order it learned it
-    has (V, C) uint8, told (V, V)    the same as a set; how much of whose list was heard
+    contacts (V, C) CONTACT          what each vehicle knows, in the order it learned it: a ring (core/know.py)
+    has (V, H), told (V, P)          the same as a set; how much of whose list was heard
     reports (V, R) CONTACT, report_count (V,)             this period's sensor reports
     beacons (D, V) BEACON, heard (D, V, K), heard_count (D, V)    a ring of D periods' beacons and hearers
 """
 
+import math
 from typing import TYPE_CHECKING
 
 from . import homing, know, radio, sense, stages, steering
-from .arrays import Flags, Floats, Integers, Records
+from .arrays import Floats, Integers, Records
+from .jit import kernel
 
 if TYPE_CHECKING:
     from .planners.bounce import start, tell
     from .planners.bounce import step as plan
+
+    LISTS = True
 
 
 def prepare(memory: Records, fleet: Records, rules: Records, edges: Floats) -> None:
@@ -43,27 +48,26 @@ def observe(
 
 
 def share(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     reports: Records, report_count: Integers, beacons: Records, slot: int,
 ) -> None:  # fmt: skip
     """Know, first half: learn what the own sensor reported, and make the beacon."""
     for i in range(poses.shape[0]):
         know.learn_seen(knowledge, i, contacts, has, reports, report_count[i])
-        know.announce(beacons, slot, i, fleet, poses, knowledge)
+        know.announce(beacons, slot, i, fleet, poses, knowledge, LISTS)
         tell(memory, i, beacons, slot)
 
 
 def deliver(
     fleet: Records, poses: Records, rules: Records, tick: int, slot: int, heard: Integers,
     heard_count: Integers,
-) -> None:  # fmt: skip
-    """Radio: who will hear the beacons sent at ``tick``."""
-    for i in range(poses.shape[0]):
-        radio.deliver(fleet, i, poses, rules, tick, slot, heard, heard_count)
+) -> float:  # fmt: skip
+    """Radio: who will hear the beacons sent at ``tick``; the squared distance (m²) of the nearest two vehicles."""
+    return radio.deliver(fleet, poses, rules, tick, slot, heard, heard_count)
 
 
 def decide(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     told: Integers, beacons: Records, heard: Integers, heard_count: Integers, slot: int, edges: Floats,
     rules: Records, settings: Records, tick: int, wishes: Records,
 ) -> None:  # fmt: skip
@@ -72,7 +76,8 @@ def decide(
     ``slot`` is that of the beacons which arrive now, sent ``rules.radio_delay`` periods ago.
     """
     for i in range(poses.shape[0]):
-        know.learn_told(knowledge, i, contacts, has, beacons, heard, heard_count[slot, i], slot, told)
+        if LISTS:
+            know.learn_told(knowledge, i, contacts, has, beacons, heard, heard_count[slot, i], slot, told)
         plan(
             memory, i, fleet, poses, knowledge, contacts, beacons, heard, heard_count, slot, edges, rules,
             settings, tick,
@@ -83,47 +88,62 @@ def decide(
 
 
 def period(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, rules: Records, settings: Records, tick: int, wishes: Records,
-) -> None:  # fmt: skip
-    """All four stages of one period."""
+) -> float:  # fmt: skip
+    """All four stages of one period; returns what ``deliver`` does."""
     depth = beacons.shape[0]
     slot = tick % depth
     arriving = (tick + depth - rules[0].radio_delay) % depth
     observe(fleet, poses, targets, grid, starts, alarms, rules, tick, reports, report_count, found)
     share(memory, fleet, poses, knowledge, contacts, has, reports, report_count, beacons, slot)
-    deliver(fleet, poses, rules, tick, slot, heard, heard_count)
+    nearest = deliver(fleet, poses, rules, tick, slot, heard, heard_count)
     decide(
         memory, fleet, poses, knowledge, contacts, has, told, beacons, heard, heard_count, arriving, edges,
         rules, settings, tick, wishes,
     )  # fmt: skip
+    return nearest
+
+
+@kernel
+def count_in_range(knowledge: Records, tick: int, in_range: Integers) -> None:
+    """Into row ``tick``: targets in range, summed over all vehicles, and how many vehicles have any."""
+    for i in range(knowledge.shape[0]):
+        in_range[tick, 0] += knowledge[i].in_range
+        in_range[tick, 1] += 1 if knowledge[i].in_range > 0 else 0
 
 
 def run_ideal(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, rules: Records, settings: Records, wishes: Records, in_range: Integers,
-) -> None:  # fmt: skip
-    """A whole search in ideal dynamics, x += v dt (eq. 2); ``in_range`` (ticks, V) counts targets in range."""
+) -> float:  # fmt: skip
+    """A whole search in ideal dynamics, x += v dt (eq. 2); ``in_range`` as count_in_range fills it.
+
+    Returns how near (m) two vehicles came.
+    """
     prepare(memory, fleet, rules, edges)
+    nearest = math.inf
     for tick in range(in_range.shape[0]):
-        period(
+        squared = period(
             memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
             report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
         )  # fmt: skip
+        nearest = min(nearest, squared)
+        count_in_range(knowledge, tick, in_range)
         for i in range(poses.shape[0]):
-            in_range[tick, i] = knowledge[i].in_range
             poses[i].v_east = wishes[i].v_east
             poses[i].v_north = wishes[i].v_north
             poses[i].east += wishes[i].v_east * rules[0].period
             poses[i].north += wishes[i].v_north * rules[0].period
+    return math.sqrt(nearest)
 
 
 def run_multicopter(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Flags,
+    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records, settings: Records,
@@ -149,8 +169,7 @@ def run_multicopter(
                 memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
                 report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
             )  # fmt: skip
-            for i in range(poses.shape[0]):
-                in_range[tick, i] = knowledge[i].in_range
+            count_in_range(knowledge, tick, in_range)
         if begun >= 0 and ahead == in_range.shape[0] * per_period:
             orders[:] = 1
             homing.order_home(fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges)

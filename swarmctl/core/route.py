@@ -10,7 +10,7 @@ import numpy as np
 
 from . import fence
 from .arrays import Floats, Records
-from .jit import kernel
+from .jit import allocating_kernel, kernel
 from .state import ROUTE_POINTS
 
 
@@ -22,7 +22,7 @@ def _sees(guard_edges: Floats, ax: float, ay: float, bx: float, by: float) -> bo
     return fence.inside(guard_edges, 0.5 * (ax + bx), 0.5 * (ay + by))
 
 
-@kernel
+@allocating_kernel
 def _shortest_tree(nodes: Floats, guard_edges: Floats, goal: int, parents: Floats) -> None:
     """Dijkstra from node ``goal``; column 0 of ``parents`` (N, 2) is the next node towards it, 1 the distance."""
     count = nodes.shape[0]
@@ -51,7 +51,7 @@ def _shortest_tree(nodes: Floats, guard_edges: Floats, goal: int, parents: Float
                 parents[n, 1] = distance
 
 
-@kernel
+@allocating_kernel
 def find(
     plan_edges: Floats, guard_edges: Floats, ax: float, ay: float, bx: float, by: float, errands: Records,
     i: int,

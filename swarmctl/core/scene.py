@@ -146,24 +146,45 @@ def cell_of(grid: Records, x: float, y: float) -> int:
 
 
 @kernel
+def bounds(places: Floats) -> tuple[float, float, float, float]:
+    """West, south, east and north of all ``places`` (T, 2); zeros if there are none."""
+    if places.shape[0] == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    west, south, east, north = places[0, 0], places[0, 1], places[0, 0], places[0, 1]
+    for t in range(1, places.shape[0]):
+        west, east = min(west, places[t, 0]), max(east, places[t, 0])
+        south, north = min(south, places[t, 1]), max(north, places[t, 1])
+    return west, south, east, north
+
+
+@kernel
 def sort_into(grid: Records, places: Floats, clusters: Integers, targets: Records, starts: Integers) -> None:
-    """Copy the targets into ``targets`` sorted by cell; cell c holds rows ``starts[c]`` to ``starts[c + 1]``."""
-    for c in range(starts.shape[0]):
-        starts[c] = 0
+    """Copy the targets into ``targets`` sorted by cell, and fill in ``starts`` (cells + 1, 2).
+
+    Cell c holds rows ``starts[c, 0]`` to ``starts[c + 1, 0]``; ``starts[c, 1]`` counts the targets of the cells up to
+    ``block`` of the grid away from it, itself among them.
+    """
+    starts[:] = 0
     for t in range(places.shape[0]):
-        starts[cell_of(grid, places[t, 0], places[t, 1]) + 1] += 1
+        starts[cell_of(grid, places[t, 0], places[t, 1]) + 1, 0] += 1
     for c in range(1, starts.shape[0]):
-        starts[c] += starts[c - 1]
+        starts[c, 0] += starts[c - 1, 0]
     for t in range(places.shape[0]):
         c = cell_of(grid, places[t, 0], places[t, 1])
-        row = starts[c]
-        starts[c] += 1
+        row = starts[c, 0]
+        starts[c, 0] += 1
         targets[row].east = places[t, 0]
         targets[row].north = places[t, 1]
         targets[row].cluster = clusters[t]
     for c in range(starts.shape[0] - 1, 0, -1):
-        starts[c] = starts[c - 1]
-    starts[0] = 0
+        starts[c, 0] = starts[c - 1, 0]
+    starts[0, 0] = 0
+    for row in range(grid[0].rows):
+        for column in range(grid[0].columns):
+            for r in range(max(row - grid[0].block, 0), min(row + grid[0].block, grid[0].rows - 1) + 1):
+                first = r * grid[0].columns + max(column - grid[0].block, 0)
+                last = r * grid[0].columns + min(column + grid[0].block, grid[0].columns - 1)
+                starts[row * grid[0].columns + column, 1] += starts[last + 1, 0] - starts[first, 0]
 
 
 @kernel

@@ -15,7 +15,7 @@ import numpy as np
 
 from . import motion, stages
 from .arrays import Floats, Integers, Records
-from .jit import kernel
+from .jit import allocating_kernel, kernel
 
 LAYER_M = 6.0
 LAYERS = 5  # shared by all; only who is stuck climbs beyond
@@ -138,7 +138,7 @@ def _give_place(
     errands[i].release_at = best_start
 
 
-@kernel
+@allocating_kernel
 def draw_up(
     fleet: Records, poses: Records, errands: Records, orders: Integers, now: float, separation: float
 ) -> None:  # fmt: skip

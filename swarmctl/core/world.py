@@ -1,5 +1,6 @@
 """All arrays of one run, and the stages as methods on them: what a flight, a study and a replay share."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -7,13 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 
 from . import bind, calls, planners, state
-from .arrays import Flags, Floats, Integers, Records
+from .arrays import Floats, Integers, Records
 from .guard import MOST_UNDER_WAY
+from .know import MOST_CONTACTS, MOST_PEERS
+from .radio import MOST_HEARD
+from .sense import WANDER_REACH
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to find: targets sorted by grid cell, the grid, and where each cell's targets start."""
+    """What there is to find: targets sorted by grid cell, the grid, and where each cell's targets start (see
+    scene.sort_into)."""
 
     targets: Records
     grid: Records
@@ -30,17 +35,19 @@ class Fences:
 
 
 def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander_mps: float = 0.0,
-               cell_m: float = 200.0) -> Scene:  # fmt: skip
-    """Sort targets at ``places`` (T, 2) into a grid of about ``cell_m`` cells (at most 256 × 256)."""
-    low = places.min(axis=0) if len(places) else np.zeros(2)
-    extent = places.max(axis=0) - low if len(places) else np.zeros(2)
-    cell = max(cell_m, float(extent.max()) / 255.0)
+               reach_m: float = 200.0) -> Scene:  # fmt: skip
+    """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m``, not much finer than there
+    are targets."""
+    places = np.ascontiguousarray(places, np.float64)
+    west, south, east, north = calls.bounds(places)
+    cell = max(reach_m, max(east - west, north - south) / max(255.0, 2.0 * math.sqrt(len(places))))
     grid = np.zeros(1, state.GRID)
-    columns, rows = (int(extent[k] // cell) + 1 for k in range(2))
-    grid[0] = (low[0], low[1], cell, columns, rows, wander_m, wander_mps)
+    columns, rows = int((east - west) // cell) + 1, int((north - south) // cell) + 1
+    block = math.ceil((reach_m + WANDER_REACH * wander_m) / cell - 1e-9)
+    grid[0] = (west, south, cell, columns, rows, block, wander_m, wander_mps)
     targets = np.zeros(len(places), state.TARGET)
-    starts = np.zeros(columns * rows + 1, np.int64)
-    calls.sort_into(grid, np.ascontiguousarray(places), clusters, targets, starts)
+    starts = np.zeros((columns * rows + 1, 2), np.int64)
+    calls.sort_into(grid, places, clusters, targets, starts)
     return Scene(targets, grid, starts)
 
 
@@ -53,6 +60,14 @@ def make_settings(algorithm: str, parameters: Mapping[str, float | str]) -> Reco
     return settings
 
 
+def power_of_two(least: int) -> int:
+    """The least power of two that is not below ``least``."""
+    return 1 << max(least - 1, 0).bit_length()
+
+
+GIVEN = ("fleet", "rules", "settings")  # a world's arrays that say what is flown; the others are its state
+
+
 class World:
     """One run's arrays, one row a vehicle, at their start.
 
@@ -63,20 +78,20 @@ class World:
         self, algorithm: str, fleet: Records, rules: Records, scene: Scene, fences: Fences, settings: Records
     ) -> None:
         count, targets = len(fleet), len(scene.targets)
-        slots = targets + count * int(rules[0]["alarm_slots"])
         depth = int(rules[0]["radio_delay"]) + 1
-        neighbours = max(count - 1, 1)
+        neighbours = min(max(count - 1, 1), MOST_HEARD)
         self.algorithm = algorithm
         self.kernels: SimpleNamespace = bind.bind(algorithm)
         self.fleet, self.rules, self.settings = fleet, rules, settings
         self.scene, self.fences = scene, fences
+        remembered = power_of_two(min(self.serials, MOST_CONTACTS))
         self.poses = np.zeros(count, state.POSE)
         self.memory: Records = np.zeros(count, self.kernels.memory_dtype)
         self.knowledge = np.zeros(count, state.KNOWLEDGE)
-        self.contacts = np.zeros((count, slots), state.CONTACT)
-        self.has: Flags = np.zeros((count, slots), np.uint8)
-        self.told: Integers = np.zeros((count, count), np.int64)
-        self.reports = np.zeros((count, targets + 1), state.CONTACT)
+        self.contacts = np.zeros((count, remembered), state.CONTACT)
+        self.has: Integers = np.zeros((count, 2 * remembered), np.int64)
+        self.told: Integers = np.zeros((count, power_of_two(min(count, MOST_PEERS))), np.int64)
+        self.reports = np.zeros((count, min(targets, MOST_CONTACTS) + 1), state.CONTACT)
         self.report_count: Integers = np.zeros(count, np.int64)
         self.alarms: Integers = np.zeros(count, np.int64)
         self.found: Integers = np.full(targets, -1, np.int64)
@@ -90,7 +105,37 @@ class World:
         self.setpoints = np.zeros(count, state.SETPOINT)
         self.sent: Floats = np.zeros((count, MOST_UNDER_WAY + 1, 2))
         self.orders: Integers = np.zeros(count, np.int64)
-        self.nearest_m = float("nan")  #: the nearest two vehicles came in a run of ideal dynamics
+        self.nearest_m = math.nan  #: how near two vehicles came in a run of ideal dynamics
+        # Targets in range, a row a period: their sum over the vehicles, and how many vehicles had any.
+        self.in_range: Integers = np.zeros((round(rules[0]["duration"] / rules[0]["period"]), 2), np.int64)
+        mine = (a for n, a in vars(self).items() if isinstance(a, np.ndarray) and n not in GIVEN)
+        self._bytes = [array.reshape(-1).view(np.uint8) for array in mine]
+
+    def restart(self, fleet: Records, rules: Records, scene: Scene) -> None:
+        """Put everything back to its start for another run of the same size: the same bytes as a new world's.
+
+        Memory that has been used before needs not be mapped anew, which would take as long as the run.
+        """
+        self.fleet, self.rules, self.scene = fleet, rules, scene
+        for data in self._bytes:
+            data.fill(0)
+        self.found.fill(-1)
+        self.nearest_m = math.nan
+
+    @property
+    def serials(self) -> int:
+        """How many serial numbers there are: of targets, and those set aside for false alarms."""
+        return len(self.scene.targets) + len(self.fleet) * int(self.rules[0]["alarm_slots"])
+
+    def contacts_of(self, i: int) -> Records:
+        """What vehicle ``i`` remembers (K,) CONTACT: in order, as long as it has forgotten nothing."""
+        known: Records = self.contacts[i, : self.knowledge[i]["known"]]
+        return known
+
+    def index(self) -> None:
+        """Make everybody's set of contacts anew, after the lists were replaced."""
+        for i in range(len(self.fleet)):
+            calls.index(self.knowledge, i, self.contacts, self.has)
 
     @property
     def depth(self) -> int:
@@ -149,25 +194,21 @@ class World:
         )  # fmt: skip
 
     def run_ideal(self) -> Integers:
-        """Search in ideal dynamics to the end; returns targets in range (ticks, V)."""
-        in_range = np.zeros(
-            (round(self.rules[0]["duration"] / self.rules[0]["period"]), len(self.fleet)), np.int64
-        )
-        self.kernels.run_ideal(
+        """Search in ideal dynamics to the end; returns ``in_range`` (periods, 2)."""
+        self.nearest_m = self.kernels.run_ideal(
             self.memory, self.fleet, self.poses, self.knowledge, self.contacts, self.has, self.told,
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.rules,
-            self.settings, self.wishes, in_range,
+            self.settings, self.wishes, self.in_range,
         )  # fmt: skip
-        return in_range
+        return self.in_range
 
     def run_multicopter(self, most_s: float = 7200.0) -> tuple[Integers, Floats, float]:
         """Fly the whole mission in a multicopter's dynamics, take-off to landing.
 
-        Returns targets in range (ticks, V); the account of steering.watch; and the flight's length in s.
+        Returns ``in_range`` (periods, 2); the account of steering.watch; and the flight's length in s.
         """
         rules = self.rules[0]
-        in_range = np.zeros((round(rules["duration"] / rules["period"]), len(self.fleet)), np.int64)
         account = np.array([np.inf, 0.0, 0.0, 0.0])
         most = round((most_s + rules["duration"]) / rules["interval"])
         ticks = self.kernels.run_multicopter(
@@ -175,6 +216,6 @@ class World:
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.fences.guard,
             self.fences.raw, self.rules, self.settings, self.wishes, self.errands, self.paths, self.wants,
-            self.sent, self.setpoints, self.orders, in_range, account, most,
+            self.sent, self.setpoints, self.orders, self.in_range, account, most,
         )  # fmt: skip
-        return in_range, account, ticks * float(rules["interval"])
+        return self.in_range, account, ticks * float(rules["interval"])

@@ -97,7 +97,7 @@ def open_world(log: Log, algorithm: str | None = None) -> World:
     ]
     targets = as_now(found["/targets"], state.TARGET, "/targets")
     # Replay senses nothing: the targets are here for their number and for pictures.
-    scene = Scene(targets, np.zeros(1, state.GRID), np.zeros(2, np.int64))
+    scene = Scene(targets, np.zeros(1, state.GRID), np.zeros((2, 2), np.int64))
     recorded = about["algorithm"]
     if recorded not in planners.MODULES:
         raise LogError(f"{log.path}: flown with {recorded}, which this version does not know")
@@ -205,7 +205,7 @@ class _Replayer:
 
     def _give_reports(self, recorded: Records) -> None:
         self._require(recorded["vehicle"], len(self.world.fleet), "/observations")
-        self._require(recorded["id"], self.world.has.shape[1], "/observations")
+        self._require(recorded["id"], self.world.serials, "/observations")
         self.world.report_count[:] = 0
         for row in recorded:
             vehicle = int(row["vehicle"])

@@ -115,7 +115,7 @@ def fence(world: World) -> Records:
 def dump_state(world: World) -> bytes:
     """All memory of all vehicles as bytes: the carried arrays, then each vehicle's contacts."""
     parts = [getattr(world, name).tobytes() for name in _CARRIED]
-    parts += [world.contacts[i, : row["known"]].tobytes() for i, row in enumerate(world.knowledge)]
+    parts += [world.contacts_of(i).tobytes() for i in range(len(world.fleet))]
     return b"".join(parts)
 
 
@@ -127,11 +127,10 @@ def load_state(world: World, data: bytes) -> None:
         flat = np.frombuffer(data, array.dtype, array.size, at)
         array[...] = flat.reshape(array.shape)
         at += array.nbytes
-    world.has[:] = 0
-    for i, row in enumerate(world.knowledge):
-        known = int(row["known"])
-        world.contacts[i, :known] = np.frombuffer(data, state.CONTACT, known, at)
-        world.has[i, world.contacts[i, :known]["id"]] = 1
-        at += known * state.CONTACT.itemsize
+    for i in range(len(world.fleet)):
+        remembered = world.contacts_of(i)
+        remembered[:] = np.frombuffer(data, state.CONTACT, len(remembered), at)
+        at += remembered.nbytes
+    world.index()
     if at != len(data):
         raise ValueError("the snapshot is of another shape")

@@ -46,7 +46,7 @@ def world(limit: int, delay: int) -> World:
     rules = rules_of(radio_delay=delay)
     fleet = fleet_of([(0.0, 0.0)] * FLEET, beacon_contacts=limit)
     return world_of(
-        "bounce", fleet, rules, fences((-1e6, 1e6, -1e6, 1e6)), [(float(t), 0.0) for t in range(TARGETS)]
+        "fco", fleet, rules, fences((-1e6, 1e6, -1e6, 1e6)), [(float(t), 0.0) for t in range(TARGETS)]
     )
 
 
@@ -69,7 +69,62 @@ def let_hear(w: World, slot: int, i: int, senders: list[int]) -> None:
 def test_learns_exactly_what_was_seen_and_told(
     periods: list[tuple[list[int], ...]], limit: int, delay: int
 ) -> None:
-    w = world(limit, delay)
+    learns_as_the_models_do(world(limit, delay), periods, limit, delay)
+
+
+@settings(max_examples=100, deadline=None)
+@given(PERIODS, st.integers(0, 3))
+def test_what_was_heard_may_be_forgotten_and_is_heard_anew(
+    periods: list[tuple[list[int], ...]], delay: int
+) -> None:
+    w = world(-1, delay)
+    w.told = np.zeros((FLEET, 2), np.int64)  # the third vehicle pushes the first out, and the other way round
+    learns_as_the_models_do(w, periods, -1, delay)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.lists(st.integers(0, 40), unique=True, max_size=9), max_size=30))
+def test_a_full_memory_forgets_the_oldest(periods: list[list[int]]) -> None:
+    w = world(-1, 0)
+    w.contacts, w.has = np.zeros((FLEET, 4), w.contacts.dtype), np.zeros((FLEET, 8), np.int64)
+    w.reports = np.zeros((FLEET, 10), w.reports.dtype)
+    learned: list[int] = []
+    for tick, serials in enumerate(periods):
+        let_see(w, 0, serials)
+        w.share(tick)
+        for serial in serials:
+            if serial not in learned[-4:]:
+                learned.append(serial)
+        assert w.knowledge["known"][0] == len(learned)
+        assert sorted(w.contacts_of(0)["id"]) == sorted(learned[-4:])
+        assert sorted(w.has[0][w.has[0] > 0] - 1) == sorted(learned[-4:])
+
+
+def test_a_full_memory_takes_in_no_more_of_what_others_tell() -> None:
+    w = world(-1, 0)
+    w.contacts, w.has = np.zeros((FLEET, 4), w.contacts.dtype), np.zeros((FLEET, 8), np.int64)
+    for tick, (own, others) in enumerate((([0, 1], [2, 3, 4]), ([], []), ([5], [6, 7]))):
+        let_see(w, 0, own)
+        let_see(w, 1, others)
+        w.share(tick)
+        let_hear(w, 0, 0, [1])
+        w.decide(tick)
+        assert sorted(w.contacts_of(0)["id"]) == ([0, 1, 2, 3], [0, 1, 2, 3], [1, 2, 3, 5])[tick]
+
+
+def test_what_a_sender_has_forgotten_is_not_told() -> None:
+    w = world(-1, 0)
+    w.contacts, w.has = np.zeros((FLEET, 4), w.contacts.dtype), np.zeros((FLEET, 8), np.int64)
+    for tick, serials in enumerate(([0, 1, 2], [3, 4])):
+        let_see(w, 1, serials)
+        w.share(tick)
+        let_hear(w, 0, 0, [1] if tick else [])
+        w.decide(tick)
+    assert sorted(w.contacts_of(0)["id"]) == [1, 2, 3, 4]
+
+
+def learns_as_the_models_do(w: World, periods: list[tuple[list[int], ...]], limit: int, delay: int) -> None:
+    """Let the world and the models live through the same periods."""
     models = [Model() for _ in range(FLEET)]
     air: list[
         tuple[list[list[int]], list[list[int]]]
@@ -102,7 +157,7 @@ def check(w: World, models: list[Model], seen: tuple[list[int], ...]) -> None:
         assert (knows["before"], knows["seen"], knows["in_range"]) == (
             model.before, model.seen, len(seen[i]),
         )  # fmt: skip
-        assert np.flatnonzero(w.has[i]).tolist() == sorted(model.known)
+        assert sorted(w.has[i][w.has[i] > 0] - 1) == sorted(model.known)
 
 
 def test_a_position_once_known_is_kept() -> None:
@@ -136,5 +191,5 @@ def test_a_window_brings_the_whole_list_in_the_end_though_beacons_are_lost() -> 
         let_hear(w, 0, 0, [1] if tick % 5 in (0, 3) else [])  # most of the beacons are lost
         w.decide(tick)
         assert w.beacons[0, 1]["last"] - w.beacons[0, 1]["first"] <= 2
-    assert sorted(w.contacts[0]["id"].tolist()) == list(range(TARGETS))
+    assert sorted(w.contacts_of(0)["id"].tolist()) == list(range(TARGETS))
     assert w.knowledge[0]["known"] == TARGETS

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from swarmctl.core import calls, randoms
 from swarmctl.core.world import World
 
 from .worlds import Place, fences, fleet_of, rules_of, world_of
@@ -17,8 +18,8 @@ WIDE = fences((-1e5, 1e5, -1e5, 1e5))
 
 
 def world(spots: list[Place], targets: list[Place] | None = None, delay: int = 0, **values: Any) -> World:
-    """Vehicles that fly under ``bounce``, which makes no use of what it hears."""
-    return world_of("bounce", fleet_of(spots, **values), rules_of(radio_delay=delay), WIDE, targets or [])
+    """Vehicles that fly under ``fco``, which tells what it knows."""
+    return world_of("fco", fleet_of(spots, **values), rules_of(radio_delay=delay), WIDE, targets or [])
 
 
 def hears(w: World, tick: int = 0) -> list[list[int]]:
@@ -116,3 +117,25 @@ def test_a_narrow_radio_carries_everything_in_time() -> None:
     assert max(np.diff(counts)) <= 3
     assert counts[10] <= 33
     assert counts[-1] == 50
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 1 << 32), st.sampled_from([49, 80, 300]), st.floats(500.0, 50_000.0))
+def test_a_large_swarm_is_heard_as_going_through_all_pairs_says(draw: int, count: int, side: float) -> None:
+    rng = np.random.default_rng(draw)
+    spots = rng.uniform(0.0, side, (count, 2))
+    w = world([(float(x), float(y)) for x, y in spots], radio_loss=0.3)
+    w.fleet["radio_range"] = rng.uniform(0.0, 900.0, count)
+    gaps = spots[:, None] - spots[None]
+    squared = gaps[..., 0] * gaps[..., 0] + gaps[..., 1] * gaps[..., 1]
+    reach = np.minimum.outer(w.fleet["radio_range"], w.fleet["radio_range"])
+    seed = int(w.rules[0]["seed"])
+    expected = [
+        [
+            j for j in range(count)
+            if j != i and squared[i, j] <= reach[i, j] * reach[i, j]
+            and calls.uniform(seed, i, 5, randoms.LOSS + j) >= 0.3
+        ]
+        for i in range(count)
+    ]  # fmt: skip
+    assert hears(w, 5) == expected

@@ -177,14 +177,15 @@ def test_the_grid_holds_every_target_once_in_its_own_cell(
     spots: list[tuple[float, float]], cell: float
 ) -> None:
     places = np.array(spots).reshape(-1, 2)
-    made = make_scene(places, np.arange(len(places)), cell_m=cell)
+    made = make_scene(places, np.arange(len(places)), reach_m=cell)
     sorted_places = np.column_stack((made.targets["east"], made.targets["north"]))
     assert sorted(made.targets["cluster"]) == list(range(len(places)))
     assert (sorted_places == places[made.targets["cluster"]]).all()
-    assert made.starts[0] == 0
-    assert made.starts[-1] == len(places)
-    for c in range(len(made.starts) - 1):
-        for x, y in sorted_places[made.starts[c] : made.starts[c + 1]]:
+    first = made.starts[:, 0]
+    assert first[0] == 0
+    assert first[-1] == len(places)
+    for c in range(len(first) - 1):
+        for x, y in sorted_places[first[c] : first[c + 1]]:
             assert scene.cell_of(made.grid, x, y) == c
 
 

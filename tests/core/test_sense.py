@@ -26,7 +26,7 @@ def sensing(
     world = world_of("bounce", fleet_of(spots, **values), rules, WIDE, targets)
     if wander:
         places = np.array(targets, float).reshape(-1, 2)
-        world.scene = make_scene(places, np.zeros(len(places), np.int64), wander, 2.0, cell_m=15.0)
+        world.scene = make_scene(places, np.zeros(len(places), np.int64), wander, 2.0, reach_m=15.0)
     return world
 
 

@@ -54,12 +54,12 @@ def perturb(world: World, rng: np.random.Generator) -> None:
         world.memory[name][OTHER] = rng.integers(0, 4) if kind == "i" else rng.uniform(-500.0, 3000.0)
     world.memory["heading_east"][OTHER], world.memory["heading_north"][OTHER] = 0.6, -0.8
     knows = rng.permutation(len(world.scene.targets))[: rng.integers(1, 60)]
-    world.has[OTHER], world.told[OTHER] = 0, 0
-    world.has[OTHER, knows] = 1
+    world.told[OTHER] = 0
     for slot, serial in enumerate(knows):
         target = world.scene.targets[serial]
         world.contacts[OTHER, slot] = (serial, target["east"], target["north"])
     world.knowledge["known"][OTHER] = len(knows)
+    world.index()
     world.poses["v_east"][OTHER], world.poses["v_north"][OTHER] = rng.uniform(-25.0, 25.0, 2)
 
 

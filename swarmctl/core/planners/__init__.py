@@ -1,6 +1,7 @@
 """The planners: one module an algorithm, and the registry of their names.
 
-A planner module has TITLE, PARAMETERS, MEMORY (a dtype that begins with the common fields) and three kernels:
+A planner module has TITLE, PARAMETERS, MEMORY (a dtype that begins with the common fields), LISTS (whether
+beacons carry lists of contacts: whether it has a use for what others saw) and three kernels:
 ``start`` prepares a memory, ``tell`` fills the planner's part of the beacon, ``step`` plans one period.  One that
 tells more than every beacon carries has its own BEACON too (a dtype that begins with state.BEACON's fields).
 """

@@ -14,6 +14,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "accurate coverage: mow every cluster found"
+LISTS = True
 PARAMETERS = (
     Parameter(
         "inertia", 0.4, "w_C, weight of the last direction in the fence response", "Algorithm 3", 0.0, 100.0

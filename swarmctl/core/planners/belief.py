@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Integers, Records
 from ..jit import kernel
+from ..know import first_new
 from ..state import BEACON as COMMON_BEACON
 from ..state import COMMON_MEMORY, record
 from . import belief_choice as choice
@@ -22,6 +23,7 @@ from . import common, sectors
 from .parameters import Parameter
 
 TITLE = "ours: fly where most is to be found for the time it takes, on a shared map"
+LISTS = True
 PARAMETERS = (
     Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
     Parameter("cell", 0.625, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
@@ -130,6 +132,12 @@ def _hear(
 
 
 @kernel
+def _remembered(knowledge: Records, i: int, contacts: Records) -> int:
+    """How many rows of vehicle ``i``'s contacts hold one."""
+    return int(min(knowledge[i].known, contacts.shape[1]))
+
+
+@kernel
 def _learn(
     memory: Records, i: int, fleet: Records, poses: Records, knowledge: Records, contacts: Records, edges: Floats,
     settings: Records,
@@ -138,10 +146,11 @@ def _learn(
     reach = settings[0].near_target * fleet[i].sensor_range
     if memory[i].laid == 0:
         _lay_out(memory, i, fleet, poses, edges, settings)
-        grid.fill_window(memory, i, edges, contacts, knowledge[i].known, reach)
+        grid.fill_window(memory, i, edges, contacts, _remembered(knowledge, i, contacts), reach)
     elif grid.move_window(memory, i, poses[i].east, poses[i].north):
-        grid.fill_window(memory, i, edges, contacts, knowledge[i].known, reach)
-    for c in range(knowledge[i].before, knowledge[i].known):
+        grid.fill_window(memory, i, edges, contacts, _remembered(knowledge, i, contacts), reach)
+    for k in range(first_new(knowledge, i, contacts), knowledge[i].known):
+        c = k & (contacts.shape[1] - 1)
         grid.promise(memory, i, contacts[i, c].east, contacts[i, c].north, reach)
     return _see(memory, i, poses, settings[0].visited * fleet[i].sensor_range)
 
@@ -165,7 +174,7 @@ def _begin_lap(
     for row in range(grid.SIDE):
         memory[i].visited[row] = 0
     reach = settings[0].near_target * fleet[i].sensor_range
-    grid.fill_window(memory, i, edges, contacts, knowledge[i].known, reach)
+    grid.fill_window(memory, i, edges, contacts, _remembered(knowledge, i, contacts), reach)
 
 
 @kernel
@@ -186,7 +195,7 @@ def _converge(
     if now < memory[i].decide_at or knowledge[i].known == memory[i].counted:
         return
     memory[i].decide_at, memory[i].counted = now + LOOK_S, knowledge[i].known
-    east, north = end.densest(contacts, i, knowledge[i].known, fleet[i].sensor_range)
+    east, north = end.densest(contacts, i, _remembered(knowledge, i, contacts), fleet[i].sensor_range)
     east, north = end.own_place(i, rules[0].separation, edges, east, north)
     memory[i].spot_east, memory[i].spot_north = east, north
 

@@ -9,4 +9,5 @@ from . import mdc
 TITLE = "baseline of the paper: MDC without a random vector"
 PARAMETERS = tuple(p._replace(default=0.0) if p.name == "random" else p for p in mdc.PARAMETERS)
 MEMORY = mdc.MEMORY
+LISTS = mdc.LISTS
 start, tell, step = mdc.start, mdc.tell, mdc.step

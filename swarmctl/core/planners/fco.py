@@ -9,12 +9,14 @@ import math
 
 from ..arrays import Floats, Integers, Records
 from ..jit import kernel
+from ..know import first_new
 from ..randoms import CHOICE, uniform
 from ..state import COMMON_MEMORY, record
 from . import common
 from .parameters import Parameter
 
 TITLE = "fast cross-over: cross a cluster towards the furthest new target"
+LISTS = True
 PARAMETERS = (
     Parameter("inertia", 0.4, "w_B, weight of the last direction", "eqs. 10, 11", 0.0, 100.0),
     Parameter("personal", 0.4, "C_p, pull to the furthest new target", "eq. 10", 0.0, 100.0),
@@ -39,7 +41,8 @@ def _furthest_new(i: int, poses: Records, knowledge: Records, contacts: Records)
     """The furthest of the targets learned this period (the set difference; eq. 9 prints an intersection)."""
     furthest = -1.0
     east, north = 0.0, 0.0
-    for c in range(knowledge[i].before, knowledge[i].known):
+    for k in range(first_new(knowledge, i, contacts), knowledge[i].known):
+        c = k & (contacts.shape[1] - 1)
         dx = contacts[i, c].east - poses[i].east
         dy = contacts[i, c].north - poses[i].north
         if dx * dx + dy * dy > furthest:

@@ -13,6 +13,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "baseline: a Lévy walk"
+LISTS = False
 PARAMETERS = (
     Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
     Parameter("mu", 2.0, "μ, exponent of the flight lengths", "Viswanathan et al. 1999", 1.01, 10.0),

@@ -15,6 +15,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "maximum density convergence: gather where targets are densest"
+LISTS = False
 PARAMETERS = (
     Parameter("inertia", 0.4, "w_A, weight of the last direction", "eqs. 7, 8", 0.0, 100.0),
     Parameter("personal", 0.3, "C_p, pull to the best place of this visit", "eq. 7", 0.0, 100.0),

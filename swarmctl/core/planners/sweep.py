@@ -15,6 +15,7 @@ from . import common
 from .parameters import Parameter
 
 TITLE = "baseline: boustrophedon strips agreed at launch"
+LISTS = False
 PARAMETERS = (
     Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
     Parameter("overlap", 0.3, "share by which neighbouring lanes' sensor swaths overlap", "ours", -1.0, 0.95),
