@@ -1,6 +1,7 @@
 """All arrays of one run, and the stages as methods on them: what a flight, a study and a replay share."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -50,12 +51,12 @@ def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander
     return Scene(targets, grid, starts)
 
 
-def make_settings(algorithm: str, parameters: dict[str, float]) -> Records:
+def make_settings(algorithm: str, parameters: Mapping[str, float | str]) -> Records:
     """One record with every parameter of ``algorithm``; those not given have their defaults."""
     known = planners.module(algorithm).PARAMETERS
     settings = np.zeros(1, state.record(*(p.name for p in known)))
     for parameter in known:
-        settings[0][parameter.name] = parameters.get(parameter.name, parameter.default)
+        settings[0][parameter.name] = parameter.number(parameters.get(parameter.name, parameter.default))
     return settings
 
 

@@ -136,8 +136,7 @@ class Scenario:
 
     def settings(self, algorithm: str) -> Records:
         """An algorithm's parameters, (1,): as the mission gives them, the others at their defaults."""
-        given = self.mission.planner.parameters.get(algorithm, {})
-        return make_settings(algorithm, {k: float(v) for k, v in given.items()})
+        return make_settings(algorithm, self.mission.planner.parameters.get(algorithm, {}))
 
     def _placed(self) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
         places = np.array(self.mission.targets.positions_m, dtype=float).reshape(-1, 2)
