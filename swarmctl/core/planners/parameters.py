@@ -9,7 +9,8 @@ from typing import NamedTuple
 class Parameter(NamedTuple):
     """One number a planner can be set with, from ``low`` to ``high``, or one of ``choices``, where there are any.
 
-    ``source``: the paper's equation, or "ours".
+    ``source``: the paper's equation, or "ours".  ``search`` is the range that ``swarmctl tune`` looks in, where values make sense rather than merely work; None:
+    tuning leaves it alone.
     """
 
     name: str
@@ -18,6 +19,7 @@ class Parameter(NamedTuple):
     source: str
     low: float = 0.0
     high: float = 1e6
+    search: tuple[float, float] | None = None
     choices: tuple[str, ...] = ()
 
     def number(self, value: float | str) -> float:
