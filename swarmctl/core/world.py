@@ -85,7 +85,9 @@ class World:
         self.fleet, self.rules, self.settings = fleet, rules, settings
         self.scene, self.fences = scene, fences
         remembered = power_of_two(min(self.serials, max(MOST_CONTACTS // count, LEAST_CONTACTS)))
-        self.poses = np.zeros(count, state.POSE)
+        self.poses = np.zeros(count, state.POSE)  #: as they are seen
+        #: as they are: of a study; where it sees exactly, the very same array
+        self.truth = np.zeros(count, state.POSE) if rules[0]["wire"] else self.poses
         self.memory: Records = np.zeros(count, self.kernels.memory_dtype)
         self.knowledge = np.zeros(count, state.KNOWLEDGE)
         self.contacts = np.zeros((count, remembered), state.CONTACT)
@@ -211,11 +213,25 @@ class World:
         rules = self.rules[0]
         account = np.array([np.inf, 0.0, 0.0, 0.0])
         most = round((most_s + rules["duration"]) / rules["interval"])
-        ticks = self.kernels.run_multicopter(
-            self.memory, self.fleet, self.poses, self.knowledge, self.contacts, self.has, self.told,
+        ticks = self.kernels.run_multicopter(*self._flown, account, most)
+        return self.in_range, account, ticks * float(rules["interval"])
+
+    def search(self, begun: int, first: int, end: int, account: Floats) -> int:
+        """Fly setpoint ticks ``first`` to ``end`` - 1 in a multicopter's dynamics, of a search begun at tick ``begun``.
+
+        Everybody is in the air already, where ``truth`` and ``poses`` say.  Returns the tick at which all had landed,
+        or ``end``.
+        """
+        ticks: int = self.kernels.search(*self._flown, account, begun, first, end)
+        return ticks
+
+    @property
+    def _flown(self) -> tuple[Records | Floats | Integers, ...]:
+        """The arrays of a flight in a multicopter's dynamics, in the kernels' order."""
+        return (
+            self.memory, self.fleet, self.truth, self.poses, self.knowledge, self.contacts, self.has, self.told,
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.fences.guard,
             self.fences.raw, self.rules, self.settings, self.wishes, self.errands, self.paths, self.wants,
-            self.sent, self.setpoints, self.orders, self.in_range, account, most,
+            self.sent, self.setpoints, self.orders, self.in_range,
         )  # fmt: skip
-        return self.in_range, account, ticks * float(rules["interval"])

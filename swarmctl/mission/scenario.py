@@ -99,6 +99,11 @@ class Scenario:
         row["radio_delay"] = math.ceil(mission.radio.delay_s / period - 1e-9)
         row["alarm_slots"] = max(_alarm_slots(v, mission.duration_s) for v in mission.fleet)
         row["landing_speed"] = LANDING_MPS
+        row["wire"] = mission.observations == "wire"
+        row["origin_lat"], row["origin_lon"], row["origin_alt"] = (
+            mission.origin.lat, mission.origin.lon, mission.origin.alt_m,
+        )  # fmt: skip
+        row["wind_east"], row["wind_north"] = mission.stub.wind_mps
         return rules
 
     def rules(self, seed: int, targets: int) -> Records:
@@ -131,7 +136,8 @@ class Scenario:
         else:
             world = again
             world.restart(fleet, rules, scene)
-        world.poses["east"], world.poses["north"] = self.starts.T
+        for poses in (world.truth, world.poses):
+            poses["east"], poses["north"] = self.starts.T
         return world
 
     def settings(self, algorithm: str) -> Records:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 class Parameter(NamedTuple):
     """One number a planner can be set with, from ``low`` to ``high``, or one of ``choices``, where there are any.
 
-    ``source``: the paper's equation, or "ours".  ``search`` is the range that ``swarmctl tune`` looks in, where values make sense rather than merely work; None:
-    tuning leaves it alone.
+    ``source``: the paper's equation, or "ours".  ``search`` is the range that ``swarmctl tune`` looks in, where values
+    make sense rather than merely work; None: tuning leaves it alone.
     """
 
     name: str
