@@ -138,8 +138,9 @@ def stopping() -> Iterator[Check]:
         say("stopped")
         sys.exit(ABORTED)
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if not asked:  # else a second one still ends what is left to do
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
