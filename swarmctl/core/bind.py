@@ -32,7 +32,7 @@ from . import loop, planners, state
 F = TypeVar("F", bound=Callable[..., object])
 # Callees first.  Those of a period are copied into what calls them: handing on their twenty arrays costs more than
 # they do.
-IN_A_PERIOD = ("observe", "share", "deliver", "decide", "period")
+IN_A_PERIOD = ("observe", "inform", "share", "deliver", "decide", "period")
 BOUND = ("prepare", *IN_A_PERIOD, "run_ideal", "search", "run_multicopter")
 _OWN_NUMBER_BYTES = 6
 _NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
@@ -77,9 +77,9 @@ def _use_cache() -> Path:
     return folder
 
 
-def is_compiled(name: str) -> bool:
-    """Whether kernels for algorithm ``name`` are in the cache already (a first start has to compile)."""
-    return any(_use_cache().rglob(f"*decide_{name.replace('-', '_')}-*.nbi"))
+def is_compiled(name: str, entry: str = "decide") -> bool:
+    """Whether ``entry`` for algorithm ``name`` is in the cache already (a first start has to compile)."""
+    return any(_use_cache().rglob(f"*.{entry}_{name.replace('-', '_')}-*.nbi"))
 
 
 @cache

@@ -47,15 +47,23 @@ def observe(
         )
 
 
+def inform(
+    memory: Records, i: int, fleet: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, reports: Records, count: int, beacons: Records, slot: int,
+) -> None:  # fmt: skip
+    """Know, first half, of one vehicle: learn the ``count`` reports of the own sensor, and make the beacon."""
+    know.learn_seen(knowledge, i, contacts, has, reports, count)
+    know.announce(beacons, slot, i, fleet, poses, knowledge, LISTS)
+    tell(memory, i, beacons, slot)
+
+
 def share(
     memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     reports: Records, report_count: Integers, beacons: Records, slot: int,
 ) -> None:  # fmt: skip
     """Know, first half: learn what the own sensor reported, and make the beacon."""
     for i in range(poses.shape[0]):
-        know.learn_seen(knowledge, i, contacts, has, reports, report_count[i])
-        know.announce(beacons, slot, i, fleet, poses, knowledge, LISTS)
-        tell(memory, i, beacons, slot)
+        inform(memory, i, fleet, poses, knowledge, contacts, has, reports, report_count[i], beacons, slot)
 
 
 def deliver(
@@ -93,12 +101,18 @@ def period(
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, rules: Records, settings: Records, tick: int, wishes: Records,
 ) -> float:  # fmt: skip
-    """All four stages of one period; returns what ``deliver`` does."""
+    """All four stages of one period; returns what ``deliver`` does.
+
+    Each vehicle senses and informs at one go, while its memory is at hand; none sees what another did meanwhile.
+    """
     depth = beacons.shape[0]
     slot = tick % depth
     arriving = (tick + depth - rules[0].radio_delay) % depth
-    observe(fleet, poses, targets, grid, starts, alarms, rules, tick, reports, report_count, found)
-    share(memory, fleet, poses, knowledge, contacts, has, reports, report_count, beacons, slot)
+    for i in range(poses.shape[0]):
+        report_count[i] = sense.sense(
+            fleet, i, poses, targets, grid, starts, alarms, rules, tick, reports, found
+        )
+        inform(memory, i, fleet, poses, knowledge, contacts, has, reports, report_count[i], beacons, slot)
     nearest = deliver(fleet, poses, rules, tick, slot, heard, heard_count)
     decide(
         memory, fleet, poses, knowledge, contacts, has, told, beacons, heard, heard_count, arriving, edges,
