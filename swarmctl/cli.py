@@ -24,6 +24,8 @@ from .console import (
     say,
 )
 from .core.planners import MODULES
+from .study_cli import study
+from .tune_cli import tune
 
 if TYPE_CHECKING:
     from .core.world import World
@@ -59,6 +61,9 @@ class SpeedType(click.ParamType):  # type: ignore[type-arg]
 def main() -> None:
     """Search an area with a swarm of MAVLink vehicles, each with its own planner."""
 
+
+main.add_command(study)
+main.add_command(tune)
 
 algorithm_option = click.option(
     "--algo", "algorithm", type=click.Choice(list(MODULES)), help="Planner, in place of the mission's."

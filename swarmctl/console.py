@@ -29,11 +29,12 @@ def plain_errors() -> Iterator[None]:
     from .flight.errors import FlightError, RefusedError, StoppedError
     from .mission.errors import MissionError
     from .record.errors import RecordError
+    from .study.errors import StudyError
     from .vehicle.addresses import AddressError
 
     try:
         yield
-    except (MissionError, RecordError, AddressError) as error:
+    except (MissionError, RecordError, StudyError, AddressError) as error:
         say(str(error))
         sys.exit(BAD_INPUT)
     except StoppedError as error:

@@ -77,9 +77,9 @@ def _use_cache() -> Path:
     return folder
 
 
-def is_compiled(name: str) -> bool:
-    """Whether kernels for algorithm ``name`` are in the cache already (a first start has to compile)."""
-    return any(_use_cache().rglob(f"*decide_{name.replace('-', '_')}-*.nbi"))
+def is_compiled(name: str, entry: str = "decide") -> bool:
+    """Whether ``entry`` for algorithm ``name`` is in the cache already (a first start has to compile)."""
+    return any(_use_cache().rglob(f"*.{entry}_{name.replace('-', '_')}-*.nbi"))
 
 
 @cache

@@ -2,36 +2,27 @@
 
 Left the map: where everybody flew, what was found and what was missed.  Right the share found over time with
 the moments at which it crossed the levels of the summary.  Long areas put the curve below the map instead.
-Colours are Okabe and Ito's, which colour-blind readers can tell apart; everything also differs in shape.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
-from .folder import write_whole
+from .drawing import COLOURS, DPI, GREY, GROUND, INK, LIGHT_COLOURS, PALE, Style, new_figure, plain, save
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Style = dict[str, Any]  # keyword arguments of matplotlib's
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195", "#8C6D31")
-LIGHT_COLOURS = ("#CC79A7", "#E69F00", "#56B4E9")  # these take dark letters
-INK, GREY, PALE, GROUND = "#1F2933", "#6B7785", "#D5DAE0", "#EEF1F4"
 KEEP_OUT_FACE, KEEP_OUT_EDGE = "#F6DEDA", "#B5483A"
-DPI = 110
 TRACK_POINTS = 6000  # a track is thinned to at most twice this many
 BADGE_PIXELS = 21.0  # across one vehicle's number
 BADGE_PLACES = 60  # along a track, tried for its number
@@ -74,9 +65,7 @@ def draw(path: Path, picture: Picture) -> None:
     figure.draw_without_rendering()  # settles the layout, which the numbers' places depend on
     figure.set_layout_engine("none")
     _draw_numbers(chart, picture)
-    image = BytesIO()
-    figure.savefig(image, format="png", facecolor="white")
-    write_whole(path, image.getvalue())
+    save(figure, path)
 
 
 def _figure(picture: Picture) -> tuple[Figure, Axes, Axes]:
@@ -90,8 +79,7 @@ def _figure(picture: Picture) -> tuple[Figure, Axes, Axes]:
     else:
         width, height = max(min(7.6 * shape, 9.0), 1.6), min(7.6, 9.0 / shape)
         size, grid = (width + 7.4, height + 1.9), {"ncols": 2, "width_ratios": (width, 5.6)}
-    figure = Figure(figsize=size, dpi=DPI, layout=ConstrainedLayoutEngine(w_pad=0.14, h_pad=0.12))
-    FigureCanvasAgg(figure)
+    figure = new_figure(*size)
     panels: Any = figure.subplots(**grid)
     return figure, panels[0], panels[1]
 
@@ -181,19 +169,12 @@ def _draw_axes(chart: Axes, picture: Picture) -> None:
             MaxNLocator(_tick_count(extent, float(np.max(high - low))), steps=(1, 2, 5, 10))
         )
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / scale:g}"))
-    _plain(chart)
+    plain(chart)
 
 
 def _tick_count(extent_m: float, longest_m: float) -> int:
     """As many ticks as have room on an axis that may be much shorter than the other."""
     return int(np.clip(round(6 * extent_m / longest_m), 2, 6))
-
-
-def _plain(axes: Axes) -> None:
-    """No frame, quiet ticks."""
-    axes.tick_params(length=0, colors=GREY, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
 
 
 def _draw_curve(curve: Axes, picture: Picture) -> None:
@@ -205,7 +186,7 @@ def _draw_curve(curve: Axes, picture: Picture) -> None:
     curve.yaxis.set_major_formatter(PercentFormatter(decimals=0, symbol=" %"))
     curve.grid(color=PALE, linewidth=0.6)
     curve.set_axisbelow(True)
-    _plain(curve)
+    plain(curve)
     if len(picture.targets) == 0:
         curve.text(0.5, 0.5, "no targets in this mission", transform=curve.transAxes, ha="center", color=GREY)
         return

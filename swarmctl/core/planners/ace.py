@@ -17,12 +17,24 @@ TITLE = "accurate coverage: mow every cluster found"
 LISTS = True
 PARAMETERS = (
     Parameter(
-        "inertia", 0.4, "w_C, weight of the last direction in the fence response", "Algorithm 3", 0.0, 100.0
+        "inertia",
+        0.4,
+        "w_C, weight of the last direction in the fence response",
+        "Algorithm 3",
+        0.0,
+        100.0,
+        (0.0, 1.0),
     ),
-    Parameter("alpha_s", 4.0, "α, a lane ends so long after its last hit", "eq. 12"),
-    Parameter("beta_s", 10.0, "β, a lane without a hit for so long ends the cluster", "eq. 13"),
-    Parameter("spacing_m", 300.0, "distance of the lanes", "ours: the paper gives none", 1.0),
-    Parameter("random", 1.0, "φ, size of the random turn on leaving", "Algorithm 3, line 19", 0.0, 100.0),
+    Parameter("alpha_s", 4.0, "α, a lane ends so long after its last hit", "eq. 12", search=(1.0, 20.0)),
+    Parameter(
+        "beta_s", 10.0, "β, a lane without a hit for so long ends the cluster", "eq. 13", search=(1.0, 30.0)
+    ),
+    Parameter(
+        "spacing_m", 300.0, "distance of the lanes", "ours: the paper gives none", 1.0, search=(50.0, 600.0)
+    ),
+    Parameter(
+        "random", 1.0, "φ, size of the random turn on leaving", "Algorithm 3, line 19", 0.0, 100.0, (0.0, 2.0)
+    ),
 )
 SEARCHING, LANE, SHIFT, LEAVING = 0, 1, 2, 3
 MEMORY = record(

@@ -8,7 +8,9 @@ from .parameters import Parameter
 
 TITLE = "baseline: straight on, a random turn at the fence"
 LISTS = False
-PARAMETERS = (Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),)
+PARAMETERS = (
+    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0, (0.0, 3.0)),
+)
 MEMORY = record(*COMMON_MEMORY)
 
 

@@ -7,7 +7,7 @@ reach Table 2's last column at all.
 from . import mdc
 
 TITLE = "baseline of the paper: MDC without a random vector"
-PARAMETERS = tuple(p._replace(default=0.0) if p.name == "random" else p for p in mdc.PARAMETERS)
+PARAMETERS = tuple(p._replace(default=0.0, search=None) if p.name == "random" else p for p in mdc.PARAMETERS)
 MEMORY = mdc.MEMORY
 LISTS = mdc.LISTS
 start, tell, step = mdc.start, mdc.tell, mdc.step

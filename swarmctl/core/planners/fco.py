@@ -18,12 +18,24 @@ from .parameters import Parameter
 TITLE = "fast cross-over: cross a cluster towards the furthest new target"
 LISTS = True
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w_B, weight of the last direction", "eqs. 10, 11", 0.0, 100.0),
-    Parameter("personal", 0.4, "C_p, pull to the furthest new target", "eq. 10", 0.0, 100.0),
-    Parameter("global", 0.2, "C_g, push away from neighbours", "eq. 11", 0.0, 100.0),
-    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 10, 11", 0.0, 100.0),
-    Parameter("revisit_s", 200.0, "revisit after so long with nothing new", "section V, Fig. 18"),
-    Parameter("revisit_radius_m", 200.0, "a revisit aims within so much of the last aim", "section V"),
+    Parameter("inertia", 0.4, "w_B, weight of the last direction", "eqs. 10, 11", 0.0, 100.0, (0.0, 1.0)),
+    Parameter("personal", 0.4, "C_p, pull to the furthest new target", "eq. 10", 0.0, 100.0, (0.0, 1.0)),
+    Parameter("global", 0.2, "C_g, push away from neighbours", "eq. 11", 0.0, 100.0, (0.0, 1.0)),
+    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 10, 11", 0.0, 100.0, (0.0, 0.5)),
+    Parameter(
+        "revisit_s",
+        200.0,
+        "revisit after so long with nothing new",
+        "section V, Fig. 18",
+        search=(20.0, 1600.0),
+    ),
+    Parameter(
+        "revisit_radius_m",
+        200.0,
+        "a revisit aims within so much of the last aim",
+        "section V",
+        search=(0.0, 1000.0),
+    ),
 )
 MEMORY = record(
     *COMMON_MEMORY, "aim_east", "aim_north", "last_new", "begun", "goal_east", "goal_north", "revisiting",

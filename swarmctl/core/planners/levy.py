@@ -15,10 +15,19 @@ from .parameters import Parameter
 TITLE = "baseline: a Lévy walk"
 LISTS = False
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
-    Parameter("mu", 2.0, "μ, exponent of the flight lengths", "Viswanathan et al. 1999", 1.01, 10.0),
-    Parameter("shortest_m", 200.0, "shortest flight", "ours: one sensor radius", 1.0),
-    Parameter("longest_m", 5000.0, "longest flight", "ours: one side of the reference area", 1.0),
+    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0, (0.0, 1.0)),
+    Parameter(
+        "mu", 2.0, "μ, exponent of the flight lengths", "Viswanathan et al. 1999", 1.01, 10.0, (1.1, 3.5)
+    ),
+    Parameter("shortest_m", 200.0, "shortest flight", "ours: one sensor radius", 1.0, search=(10.0, 2000.0)),
+    Parameter(
+        "longest_m",
+        5000.0,
+        "longest flight",
+        "ours: one side of the reference area",
+        1.0,
+        search=(2000.0, 10000.0),
+    ),
 )
 MEMORY = record(*COMMON_MEMORY, "left_m")
 

@@ -17,13 +17,27 @@ from .parameters import Parameter
 TITLE = "maximum density convergence: gather where targets are densest"
 LISTS = False
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w_A, weight of the last direction", "eqs. 7, 8", 0.0, 100.0),
-    Parameter("personal", 0.3, "C_p, pull to the best place of this visit", "eq. 7", 0.0, 100.0),
-    Parameter("global", 0.3, "C_g, pull to the best place among neighbours on targets", "eq. 8", 0.0, 100.0),
-    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 7, 8", 0.0, 100.0),
-    Parameter("jump_out_s", 15.0, "leave after so long without a better place", "section VII-B"),
+    Parameter("inertia", 0.4, "w_A, weight of the last direction", "eqs. 7, 8", 0.0, 100.0, (0.0, 1.0)),
+    Parameter("personal", 0.3, "C_p, pull to the best place of this visit", "eq. 7", 0.0, 100.0, (0.0, 1.0)),
     Parameter(
-        "return_s", 200.0, "fly back to the best place after so long without a visit", "section IV (3)"
+        "global",
+        0.3,
+        "C_g, pull to the best place among neighbours on targets",
+        "eq. 8",
+        0.0,
+        100.0,
+        (0.0, 1.0),
+    ),
+    Parameter("random", 0.05, "φ, size of the random vector", "eqs. 7, 8", 0.0, 100.0, (0.0, 0.5)),
+    Parameter(
+        "jump_out_s", 15.0, "leave after so long without a better place", "section VII-B", search=(1.0, 60.0)
+    ),
+    Parameter(
+        "return_s",
+        200.0,
+        "fly back to the best place after so long without a visit",
+        "section IV (3)",
+        search=(20.0, 1600.0),
     ),
     Parameter("dwell_s", 0.0, "leave after so long on one cluster; 0: never", "section VII-B, Fig. 12"),
 )

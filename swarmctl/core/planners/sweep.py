@@ -17,8 +17,16 @@ from .parameters import Parameter
 TITLE = "baseline: boustrophedon strips agreed at launch"
 LISTS = False
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
-    Parameter("overlap", 0.3, "share by which neighbouring lanes' sensor swaths overlap", "ours", -1.0, 0.95),
+    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0, (0.0, 1.0)),
+    Parameter(
+        "overlap",
+        0.3,
+        "share by which neighbouring lanes' sensor swaths overlap",
+        "ours",
+        -1.0,
+        0.95,
+        search=(-0.5, 0.6),
+    ),
 )
 TRANSFER, ALONG = 0, 1
 PATIENCE = 3.0  # a leg is given up after so many times its straight flight
