@@ -3,7 +3,7 @@
 Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell``, ``plan`` and
 ``LISTS`` (whether beacons carry contacts).  A flight calls the four stages one by one, so that its recorder sees
 what passes between them and a replay can put recorded reports and deliveries in their place; a study calls
-``period`` and ``run_ideal``.
+``period`` and ``run_ideal``, or ``run_multicopter``.
 Arrays have one row a vehicle:
 
     fleet VEHICLE, poses POSE, knowledge KNOWLEDGE, memory the planner's MEMORY, wishes WISH
@@ -16,7 +16,7 @@ Arrays have one row a vehicle:
 import math
 from typing import TYPE_CHECKING
 
-from . import homing, know, radio, sense, stages, steering
+from . import homing, know, radio, sense, stages, steering, wire
 from .arrays import Floats, Integers, Records
 from .jit import kernel
 
@@ -156,43 +156,67 @@ def run_ideal(
     return math.sqrt(nearest)
 
 
-def run_multicopter(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
-    told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
-    report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
-    edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records, settings: Records,
-    wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats, setpoints: Records,
-    orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
+def search(
+    memory: Records, fleet: Records, truth: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers,
+    reports: Records, report_count: Integers, found: Integers, beacons: Records, heard: Integers,
+    heard_count: Integers, edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records,
+    settings: Records, wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats,
+    setpoints: Records, orders: Integers, in_range: Integers, account: Floats, begun: int, first: int, end: int,
 ) -> int:  # fmt: skip
-    """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
+    """Setpoint ticks ``first`` to ``end`` - 1 of a search that began at tick ``begun``, and of the return after it.
 
-    Returns the number of setpoint ticks; ``most_ticks`` means that not everybody landed.
+    Returns the tick at which everybody had landed, or ``end``.
     """
-    prepare(memory, fleet, rules, edges)
     per_period = round(rules[0].period / rules[0].interval)
-    begun = -1
-    for i in range(errands.shape[0]):
-        errands[i].stage = stages.TAKE_OFF
-    for k in range(most_ticks):
-        if begun < 0 and steering.release(errands):
-            begun = k
-        ahead = k - begun
-        if begun >= 0 and ahead % per_period == 0 and ahead // per_period < in_range.shape[0]:
+    for k in range(first, end):
+        ahead, now = k - begun, k * rules[0].interval
+        if ahead % per_period == 0 and ahead // per_period < in_range.shape[0]:
             tick = ahead // per_period
             period(
                 memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
                 report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
             )  # fmt: skip
             count_in_range(knowledge, tick, in_range)
-        if begun >= 0 and ahead == in_range.shape[0] * per_period:
+        if ahead == in_range.shape[0] * per_period:
             orders[:] = 1
-            homing.order_home(fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges)
-        steering.steer(
-            fleet, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, paths, wants,
-            sent, setpoints,
+            homing.order_home(fleet, poses, errands, orders, now, rules, edges, guard_edges)
+        steering.go_on(
+            fleet, truth, poses, errands, wishes, now, rules, edges, guard_edges, raw_edges, paths, wants, sent,
+            setpoints, account,
         )  # fmt: skip
-        steering.move(fleet, poses, errands, sent, setpoints, rules)
-        steering.watch(poses, errands, raw_edges, account)
         if steering.all_landed(errands):
             return k
+    return end
+
+
+def run_multicopter(
+    memory: Records, fleet: Records, truth: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers,
+    reports: Records, report_count: Integers, found: Integers, beacons: Records, heard: Integers,
+    heard_count: Integers, edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records,
+    settings: Records, wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats,
+    setpoints: Records, orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
+) -> int:  # fmt: skip
+    """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
+
+    Stages read ``poses``, which messages may have rounded; ``truth`` moves.  Returns the number of setpoint ticks;
+    ``most_ticks`` means that not everybody landed.
+    """
+    prepare(memory, fleet, rules, edges)
+    wire.observe(truth, poses, rules)
+    for i in range(errands.shape[0]):
+        errands[i].stage = stages.TAKE_OFF
+    for k in range(most_ticks):
+        if steering.release(errands):
+            return search(
+                memory, fleet, truth, poses, knowledge, contacts, has, told, targets, grid, starts, alarms,
+                reports, report_count, found, beacons, heard, heard_count, edges, guard_edges, raw_edges, rules,
+                settings, wishes, errands, paths, wants, sent, setpoints, orders, in_range, account, k, k,
+                most_ticks,
+            )  # fmt: skip
+        steering.go_on(
+            fleet, truth, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, raw_edges,
+            paths, wants, sent, setpoints, account,
+        )  # fmt: skip
     return most_ticks
