@@ -23,10 +23,10 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
 @kernel
 def _anybody_returns(errands: Records) -> bool:
     """Whether a vehicle is on its way home."""
+    returning = 0
     for i in range(errands.shape[0]):
-        if stages.WAIT <= errands[i].stage <= stages.LAND:
-            return True
-    return False
+        returning += 1 if stages.WAIT <= errands[i].stage <= stages.LAND else 0
+    return returning > 0
 
 
 @kernel
