@@ -17,8 +17,8 @@ from ..know import first_new
 from ..state import BEACON as COMMON_BEACON
 from ..state import COMMON_MEMORY, record
 from . import belief_choice as choice
-from . import belief_grid as grid
 from . import belief_end as end
+from . import belief_grid as grid
 from . import common, sectors
 from .parameters import Parameter
 
@@ -99,7 +99,13 @@ LONG_AGO = -1e9
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
     """Agree on the sectors; cells are laid at the first step, where the settings are at hand."""
     sectors.agree(memory, i, fleet, edges)
-    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].lap, memory[i].counted = FIRST_LEG, 0, -1, 0, 0
+    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].lap, memory[i].counted = (
+        FIRST_LEG,
+        0,
+        -1,
+        0,
+        0,
+    )
     memory[i].decide_at, memory[i].give_up_at, memory[i].side = 0.0, 0.0, 0.0
     for k in range(choice.MET):
         memory[i].met_at[k] = LONG_AGO
@@ -119,7 +125,9 @@ def _set_worths(memory: Records, i: int, settings: Records) -> None:
 
 
 @kernel
-def _lay_out(memory: Records, i: int, fleet: Records, poses: Records, edges: Floats, settings: Records) -> None:
+def _lay_out(
+    memory: Records, i: int, fleet: Records, poses: Records, edges: Floats, settings: Records
+) -> None:
     """Lay the cells and open the window on them, before anything is known."""
     _set_worths(memory, i, settings)
     grid.lay_cells(memory, i, fleet, edges, settings[0].cell, settings[0].cell_most)
@@ -240,7 +248,10 @@ def _decide(
     """
     if not fresh and now > memory[i].give_up_at:
         grid.give_up(
-            memory, i, memory[i].goal_row - memory[i].first_row, memory[i].goal_column - memory[i].first_column
+            memory,
+            i,
+            memory[i].goal_row - memory[i].first_row,
+            memory[i].goal_column - memory[i].first_column,
         )
         fresh = True
     row, column = grid.row_at(memory, i, poses[i].north), grid.column_at(memory, i, poses[i].east)
@@ -329,4 +340,7 @@ def tell(memory: Records, i: int, beacons: Records, slot: int) -> None:
         beacons[slot, i].visited[row] = memory[i].visited[row]
     for k in range(choice.MET):
         beacons[slot, i].met[k], beacons[slot, i].met_at[k] = memory[i].met[k], memory[i].met_at[k]
-        beacons[slot, i].met_east[k], beacons[slot, i].met_north[k] = memory[i].met_east[k], memory[i].met_north[k]
+        beacons[slot, i].met_east[k], beacons[slot, i].met_north[k] = (
+            memory[i].met_east[k],
+            memory[i].met_north[k],
+        )
