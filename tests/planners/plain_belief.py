@@ -60,6 +60,7 @@ class Shadow:
             Mind(self._nowhere(), ~self.legal, (float(pose["east"]), float(pose["north"])))
             for pose in world.poses
         ]
+        self.own = [self._own(i) for i in range(len(self.minds))]
         self.told: dict[int, list[Told]] = {}
 
     def _nowhere(self) -> Flags:
@@ -77,6 +78,11 @@ class Shadow:
         self.east: Floats = np.array([west + (k + 0.5) * self.cell for k in range(columns)])
         self.north: Floats = np.array([south + (k + 0.5) * self.cell for k in range(rows)])
         self.legal = np.array([[fence.inside(edges, x, y) for x in self.east] for y in self.north])
+
+    def _own(self, i: int) -> Flags:
+        """The cells in vehicle ``i``'s sector."""
+        own = [[sectors.own(self.world.memory, i, float(x), float(y)) for x in self.east] for y in self.north]
+        return np.array(own)
 
     def _near(self, east: float, north: float, reach: float) -> Flags:
         """The cells with their centre within ``reach`` of a place."""
@@ -179,18 +185,15 @@ class Shadow:
         for contact in self.world.contacts_of(i):
             promising |= self._near(float(contact["east"]), float(contact["north"]), reach)
         empty = np.pad((mind.visited & ~promising & ~mind.barred).astype(int), 2)
-        worth = np.zeros(promising.shape, np.int64)
-        for row, column in np.argwhere(~(mind.visited | mind.barred)).tolist():
-            if promising[row, column]:
-                worth[row, column] = round(1000.0 * self.settings["promising"])
-                continue
-            count = int(empty[row : row + 5, column : column + 5].sum())
-            share = min(1.0, count / (25.0 * self.settings["empty_share"]))
-            value = 1000.0 * (1.0 - self.settings["emptiness"] * share)
-            if not sectors.own(self.world.memory, i, float(self.east[column]), float(self.north[row])):
-                value *= self.settings["foreign"]
-            worth[row, column] = round(value)
-        return worth
+        count = np.zeros(promising.shape)
+        for row in range(5):
+            for column in range(5):
+                count += empty[row : row + promising.shape[0], column : column + promising.shape[1]]
+        share = np.minimum(1.0, count / (25.0 * self.settings["empty_share"]))
+        value = 1000.0 * (1.0 - self.settings["emptiness"] * share)
+        value = np.where(self.own[i], value, self.settings["foreign"] * value)
+        value = np.where(promising, 1000.0 * self.settings["promising"], value)
+        return np.where(mind.visited | mind.barred, 0, np.rint(value)).astype(np.int64)
 
     def _value(self, i: int, mind: Mind, now: float, heading: Floats, cell: Cell, total: int) -> float:
         """What a cell is worth a second."""
