@@ -29,10 +29,10 @@ PARAMETERS = (
         "inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0,
         search=(0.0, 1.0),
     ),
-    Parameter("cell", 0.625, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
+    Parameter("cell", 0.75, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
     Parameter("cell_most", 1.5, "width of a cell where the area is large, in sensor ranges", "ours", 0.05, 10.0),
     Parameter(
-        "visited", 0.9, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0,
+        "visited", 1.0, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0,
         search=(0.5, 1.5),
     ),
     Parameter(
@@ -60,7 +60,7 @@ PARAMETERS = (
         search=(0.0, 1.0),
     ),
     Parameter(
-        "seen_s", 60.0, "another vehicle counts for so long after it was heard of", "ours",
+        "seen_s", 120.0, "another vehicle counts for so long after it was heard of", "ours",
         search=(0.0, 300.0),
     ),
     Parameter(
