@@ -96,6 +96,7 @@ def study(
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, address))
         try:
+            _warm_up(under_way, executor, address is None)
             _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
@@ -146,6 +147,19 @@ def stopping() -> Iterator[Check]:
         if not asked:  # else a second one still ends what is left to do
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def _warm_up(under_way: "Study", executor: "Executor", here: bool) -> None:
+    """Have everything compiled before the clock starts."""
+    if not here:
+        say("the workers load their kernels, or compile them: a first start takes some seconds an algorithm")
+        under_way.warm_up_elsewhere(executor)
+        return
+    under_way.warm_up(
+        lambda name: say(
+            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
+        )
+    )
 
 
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
