@@ -50,7 +50,9 @@ def figure(times: Floats) -> str:
     return f"{done.mean():.0f}±{done.std():.0f} ({len(times) - len(done)})"
 
 
-def fly(algorithm: str, seeds: Sequence[int], *, ideal: bool = True, settings: Settings | None = None) -> Records:
+def fly(
+    algorithm: str, seeds: Sequence[int], *, ideal: bool = True, settings: Settings | None = None
+) -> Records:
     """RUN records of some runs of the reference scenario, with something different."""
     return simulate(Job(load(PAPER, settings), algorithm, tuple(seeds), ideal))
 
@@ -74,15 +76,19 @@ def speed() -> None:
 
 
 def reference(runs: int) -> None:
-    """All levels in both dynamics, pairs won against fco, and what ``then: converge`` gives; a fifth with multicopters."""
+    """All levels, pairs won against fco, and what ``then: converge`` gives; a fifth of the runs with multicopters."""
     for ideal in (True, False):
         seeds = range(1, (runs if ideal else runs // 5) + 1)
         flown = {name: fly(name, seeds, ideal=ideal) for name in ("belief", "fco")}
         for name, results in flown.items():
-            levels = "  ".join(f"{p} %: {figure(results['time_s'][:, k])}" for k, p in enumerate(LEVELS_PERCENT))
+            levels = "  ".join(
+                f"{p} %: {figure(results['time_s'][:, k])}" for k, p in enumerate(LEVELS_PERCENT)
+            )
             print(f"{'ideal' if ideal else 'multicopter'} {name:7} {levels}", flush=True)
         times = {name: results["time_s"][:, LEVEL] for name, results in flown.items()}
-        print(f"    belief is ahead at 85 % in {np.mean(times['belief'] < times['fco']):.1%} of {len(seeds)} pairs")
+        print(
+            f"    belief is ahead at 85 % in {np.mean(times['belief'] < times['fco']):.1%} of {len(seeds)} pairs"
+        )
         results = fly("belief", seeds, ideal=ideal, settings={"planner.parameters.belief.then": "converge"})
         print(
             f"    then converge: {results['in_range'].mean():.1f} targets in range on average, "
@@ -93,7 +99,9 @@ def reference(runs: int) -> None:
 
 def table(runs: int) -> None:
     """Time to 85 % in other scenarios; a fifth of the runs with multicopters."""
-    print("\n| | belief, ideal | fco, ideal | belief, multicopter | fco, multicopter |\n|---|---|---|---|---|")
+    print(
+        "\n| | belief, ideal | fco, ideal | belief, multicopter | fco, multicopter |\n|---|---|---|---|---|"
+    )
     for name, settings in TABLE.items():
         columns = [
             figure(
@@ -123,13 +131,17 @@ def wind(flights: int) -> None:
     for speed_mps in WINDS:
         for algorithm in ("belief", "fco"):
             with tempfile.TemporaryDirectory() as folder:
-                times = [flight_time(algorithm, seed, speed_mps, Path(folder)) for seed in range(1, flights + 1)]
+                times = [
+                    flight_time(algorithm, seed, speed_mps, Path(folder)) for seed in range(1, flights + 1)
+                ]
             print(f"wind {speed_mps} m/s, {algorithm}: {figure(np.array(times))}", flush=True)
 
 
 def main() -> None:
     """Print what is asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     for part in ("speed", "reference", "table", "wind"):
         parser.add_argument(f"--{part}", action="store_true")
     parser.add_argument("--runs", type=int, default=1000)

@@ -40,7 +40,9 @@ class Mind:
     barred: Flags
     was: tuple[float, float]
     lap: int = 0
-    met: dict[int, tuple[int, Seen]] = field(default_factory=dict)  # place in the table: who, and when and where
+    met: dict[int, tuple[int, Seen]] = field(
+        default_factory=dict
+    )  # place in the table: who, and when and where
     goal: Cell | None = None
     first_leg: bool = True
     lost: bool = False

@@ -1,4 +1,4 @@
-"""Belief sweep's kernels, which do as little anew as they can, decide what the plain version decides, to the last bit."""
+"""Belief sweep's kernels do as little anew as they can, and decide what the plain version does, to the last bit."""
 
 from pathlib import Path
 from typing import Any
