@@ -23,10 +23,11 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
 @kernel
 def _anybody_returns(errands: Records) -> bool:
     """Whether a vehicle is on its way home."""
+    returns = False
     for i in range(errands.shape[0]):
         if stages.WAIT <= errands[i].stage <= stages.LAND:
-            return True
-    return False
+            returns = True
+    return returns
 
 
 @kernel

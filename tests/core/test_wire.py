@@ -5,11 +5,11 @@ import pytest
 
 from swarmctl.core import stages, state
 from swarmctl.core.world import World
+from swarmctl.mavlink.codec import Decoder, Encoder
 from swarmctl.mission.load import load
 from swarmctl.mission.scenario import Scenario
 from swarmctl.vehicle.autopilots.px4 import Px4
 from swarmctl.vehicle.telemetry import GeoPoint, Telemetry
-from swarmctl.mavlink.codec import Decoder, Encoder
 
 
 def studied(observations: str, **keys: object) -> World:
