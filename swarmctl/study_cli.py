@@ -138,8 +138,14 @@ def stopping() -> Iterator[Check]:
         say("stopped")
         sys.exit(ABORTED)
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if not asked:  # else a second one still ends what is left to do
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def compiling(name: str) -> None:
+    """Say why nothing happens yet."""
+    say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
 
 
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
@@ -147,11 +153,7 @@ def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
+    under_way.warm_up(compiling)
     say(_intention(plan))
     with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)

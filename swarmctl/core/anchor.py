@@ -1,4 +1,4 @@
-"""Anchors: circles in which vehicles stay for a while, so that most setpoint ticks need no look at fence and others.
+"""Anchors: circles in which vehicles are for a while, so that most setpoint ticks test neither fence nor others.
 
 Around its anchor a vehicle moves freely for some metres (``freedom``).  From there no stop path, whatever it is told,
 leads farther than it can fly in its latency and then brake: the path stays in the circle of radius ``hold``.  While
@@ -25,9 +25,9 @@ def _reach(fleet: Records, i: int, fastest: float, interval: float) -> float:
     """How far (m) a stop path of vehicle ``i`` can lead that flies no faster than ``fastest``."""
     braking = guard.BRAKING_SHARE * fleet[i].braking
     lag = fleet[i].lag
-    flown: float = (guard.under_way(fleet, i, interval) + 1) * interval * fastest
-    flown += fastest * fastest / (2.0 * braking) + min(fastest, braking * lag) * lag
-    return flown + ROUNDING_M
+    flown = (guard.under_way(fleet, i, interval) + 1) * interval * fastest
+    braked = fastest * fastest / (2.0 * braking) + min(fastest, braking * lag) * lag
+    return float(flown + braked + ROUNDING_M)
 
 
 @kernel

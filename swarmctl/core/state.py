@@ -92,12 +92,15 @@ ERRAND = record(
     integers=("stage", "points", "next"),
 )  # fmt: skip
 
-# One target: where it lies (or about where it wanders).
+# One target: where it lies, or about where it moves (core/roam.py), and its cluster.
 TARGET = record("east", "north", "cluster", integers=("cluster",))
 
-# The grid that the targets, sorted by cell, are found through; whoever sees no further than `block` cells sees
-# nothing where there are no targets so many cells around.
+# The grid that the targets, sorted by cell, are found through, and how they move.  Whoever sees no further than
+# `block` cells sees nothing where there are no targets so many cells around.  `stray` is how far from its place in
+# TARGET a target can be at most: 0 where nothing moves.  Where clusters drift there is one row a cluster, for its
+# way (a unit vector, and how many metres ahead and behind it goes); all else is read from the first row.
 GRID = record(
-    "east", "north", "cell", "columns", "rows", "block", "wander", "wander_speed",
-    integers=("columns", "rows", "block"),
+    "east", "north", "cell", "columns", "rows", "block", "seed", "stray", "wander", "wander_speed",
+    "drift_speed", "way_east", "way_north", "ahead", "behind",
+    integers=("columns", "rows", "block", "seed"),
 )  # fmt: skip

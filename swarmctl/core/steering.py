@@ -23,11 +23,10 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
 @kernel
 def _anybody_returns(errands: Records) -> bool:
     """Whether a vehicle is on its way home."""
-    returns = False
+    returning = 0
     for i in range(errands.shape[0]):
-        if stages.WAIT <= errands[i].stage <= stages.LAND:
-            returns = True
-    return returns
+        returning += 1 if stages.WAIT <= errands[i].stage <= stages.LAND else 0
+    return returning > 0
 
 
 @kernel
@@ -38,9 +37,9 @@ def steer(
     """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
     for i in range(fleet.shape[0]):
         anchor.settle(fleet, i, poses, rules, guard_edges, paths)
-    shown = _anybody_returns(errands)  # who looks at everybody's paths; else only neighbours do
+    shown = _anybody_returns(errands)  # who looks at everybody's paths
     for i in range(fleet.shape[0]):
-        if shown or paths[i].near != 0:
+        if shown or not guard.free(paths, i):
             airborne = stages.airborne(errands[i].stage)
             up = _wanted_up(fleet, errands, poses, i)
             guard.own_path(fleet, i, poses, sent, rules[0].interval, up, airborne, paths)

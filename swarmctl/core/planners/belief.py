@@ -25,20 +25,50 @@ from .parameters import Parameter
 TITLE = "ours: fly where most is to be found for the time it takes, on a shared map"
 LISTS = True
 PARAMETERS = (
-    Parameter("inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0),
+    Parameter(
+        "inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0,
+        search=(0.0, 1.0),
+    ),
     Parameter("cell", 0.625, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
     Parameter("cell_most", 1.5, "width of a cell where the area is large, in sensor ranges", "ours", 0.05, 10.0),
-    Parameter("visited", 0.9, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0),
-    Parameter("near_target", 1.0, "a cell is promising within so many sensor ranges of a target", "ours", 0.0, 10.0),
-    Parameter("promising", 3.0, "worth of a promising cell; an unknown one's is 1", "ours", 0.0, 1000.0),
-    Parameter("emptiness", 0.7, "what an unknown cell among empty ones loses of its worth", "ours", 0.0, 1.0),
-    Parameter("empty_share", 0.5, "share of empty cells in 5 x 5 at which it has lost all of that", "ours", 0.04, 1.0),
-    Parameter("foreign", 0.5, "what an unknown cell of another's sector keeps of its worth", "ours", 0.0, 1.0),
-    Parameter("nearer", 0.3, "what a cell that another vehicle is nearer to keeps of its worth", "ours", 0.0, 1.0),
-    Parameter("seen_s", 60.0, "another vehicle counts for so long after it was heard of", "ours"),
-    Parameter("arrival_s", 10.0, "time that every cell takes, beside the way there", "ours", 0.001),
-    Parameter("turn_s", 4.0, "time that a turn takes, for each radian", "ours"),
-    Parameter("decide_s", 3.0, "a new choice after so long, or on arrival", "ours"),
+    Parameter(
+        "visited", 0.9, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0,
+        search=(0.5, 1.5),
+    ),
+    Parameter(
+        "near_target", 1.0, "a cell is promising within so many sensor ranges of a target", "ours", 0.0, 10.0,
+        search=(0.3, 2.0),
+    ),
+    Parameter(
+        "promising", 3.0, "worth of a promising cell; an unknown one's is 1", "ours", 0.0, 1000.0,
+        search=(1.0, 10.0),
+    ),
+    Parameter(
+        "emptiness", 0.7, "what an unknown cell among empty ones loses of its worth", "ours", 0.0, 1.0,
+        search=(0.0, 1.0),
+    ),
+    Parameter(
+        "empty_share", 0.5, "share of empty cells in 5 x 5 at which it has lost all of that", "ours", 0.04, 1.0,
+        search=(0.1, 1.0),
+    ),
+    Parameter(
+        "foreign", 0.5, "what an unknown cell of another's sector keeps of its worth", "ours", 0.0, 1.0,
+        search=(0.0, 1.0),
+    ),
+    Parameter(
+        "nearer", 0.3, "what a cell that another vehicle is nearer to keeps of its worth", "ours", 0.0, 1.0,
+        search=(0.0, 1.0),
+    ),
+    Parameter(
+        "seen_s", 60.0, "another vehicle counts for so long after it was heard of", "ours",
+        search=(0.0, 300.0),
+    ),
+    Parameter(
+        "arrival_s", 10.0, "time that every cell takes, beside the way there", "ours", 0.001,
+        search=(1.0, 30.0),
+    ),
+    Parameter("turn_s", 4.0, "time that a turn takes, for each radian", "ours", search=(0.0, 15.0)),
+    Parameter("decide_s", 3.0, "a new choice after so long, or on arrival", "ours", search=(1.0, 15.0)),
     Parameter(
         "then", "hold", "when little is left: search all over again, or converge on the densest known spot", "ours",
         choices=("hold", "converge"),
