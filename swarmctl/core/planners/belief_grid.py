@@ -273,5 +273,6 @@ def take_over(memory: Records, i: int, beacons: Records, slot: int, j: int) -> N
     """Mark what vehicle ``j`` says was visited, as far as the two windows overlap."""
     across = beacons[slot, j].first_column - memory[i].first_column
     up = beacons[slot, j].first_row - memory[i].first_row
-    for row in range(max(up, 0), min(SIDE + up, SIDE)):
+    rows = rows_of(memory, i)
+    for row in range(max(up, 0), min(rows + up, rows)):
         visit_row(memory, i, row, _shifted(beacons[slot, j].visited[row - up], across))
