@@ -149,17 +149,18 @@ def stopping() -> Iterator[Check]:
                 signal.signal(number, handler)
 
 
+def compiling(name: str) -> None:
+    """Say why nothing happens yet."""
+    say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
+
+
 def _warm_up(under_way: "Study", executor: "Executor", here: bool) -> None:
     """Have everything compiled before the clock starts."""
     if not here:
         say("the workers load their kernels, or compile them: a first start takes some seconds an algorithm")
         under_way.warm_up_elsewhere(executor)
         return
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
+    under_way.warm_up(compiling)
 
 
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
@@ -167,11 +168,6 @@ def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
     say(_intention(plan))
     with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)

@@ -17,6 +17,8 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
+from swarmctl.mission.model import Mission
+
 from .drawing import COLOURS, DPI, GREY, GROUND, INK, LIGHT_COLOURS, PALE, Style, new_figure, plain, save
 
 Floats = NDArray[np.float64]
@@ -34,6 +36,7 @@ KILOMETRES_FROM_M = 2000.0
 class Picture:
     """What is drawn.  Positions are metres east and north, shape (n, 2); times are seconds of search.
 
+    Targets are drawn where they were laid out, also those that move from there (``subtitle_of`` says so).
     ``found`` (T,) tells which of the targets (T, 2) were; ``fraction`` (P,), 0 to 1, is the share found at
     ``times_s`` (P,); ``crossings`` has the time of each level in percent, None where it was not reached.
     """
@@ -50,6 +53,12 @@ class Picture:
     duration_s: float
     subtitle: str = ""
     returns: Sequence[Floats] = ()  #: ways home, (n, 2) each; ``tracks`` then end where the search did
+
+
+def subtitle_of(mission: Mission, seed: int) -> str:
+    """Which run a picture is of, and how its targets are to be read."""
+    moving = "; targets move, drawn where they started" if mission.targets.move else ""
+    return f"{mission.name}, seed {seed}{moving}"
 
 
 def draw(path: Path, picture: Picture) -> None:

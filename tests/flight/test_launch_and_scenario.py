@@ -163,6 +163,25 @@ def test_targets_are_legal_numerous_and_in_their_clusters() -> None:
         assert set(targets["cluster"].tolist()) == set(range(6))
 
 
+def test_targets_move_as_the_mission_says_and_start_from_the_layout_that_stands_still() -> None:
+    still = Scenario(paper(), ideal=True).scene(3)
+    moves = {"targets__motion": "wander", "targets__wander_mps": 0.5}
+    wander = Scenario(paper(**moves), ideal=True).scene(3)
+    drift = Scenario(paper(targets__cluster_motion="drift", targets__cluster_mps=2.0), ideal=True).scene(3)
+    assert still.targets.tobytes() == wander.targets.tobytes() == drift.targets.tobytes()
+    assert (still.grid[0]["stray"], still.grid[0]["drift_speed"], len(still.grid)) == (0.0, 0.0, 1)
+    assert wander.grid[["seed", "wander", "wander_speed", "drift_speed"]].tolist() == [(3, 45.0, 0.5, 0.0)]
+    assert drift.grid[["seed", "wander", "drift_speed"]].tolist() == [(3, 0.0, 2.0)] * 6
+    assert 300.0 < drift.grid["ahead"].max() <= 600.0
+
+
+def test_targets_of_a_file_drift_together() -> None:
+    lake = load("lake", {"targets.cluster_motion": "drift"})
+    grid = Scenario(lake, ideal=True).scene(1).grid
+    assert len(grid) == 1
+    assert grid[0]["drift_speed"] == 1.5
+
+
 def test_targets_of_a_file_are_those_targets_whatever_the_seed() -> None:
     scenario = Scenario(load("lake"), ideal=False)
     one, other = scenario.scene(1).targets, scenario.scene(2).targets

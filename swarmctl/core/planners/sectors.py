@@ -13,6 +13,7 @@ import math
 
 from ..arrays import Floats, Records
 from ..jit import kernel
+from . import common
 
 TURN = 2.0 * math.pi
 PROBES = 72  # wedges in which an empty one is looked for, to begin to count at
@@ -106,9 +107,9 @@ def _shares(fleet: Records, i: int, first: float) -> tuple[float, float]:
     """Vehicle ``i``'s share of the area from which to which, in the order of the initial headings from ``first``."""
     first_x, first_y = math.cos(first), math.sin(first)
     mine = _order(fleet[i].heading_east, fleet[i].heading_north, first_x, first_y)
-    before, own, whole = 0.0, fleet[i].speed * fleet[i].sensor_range, 0.0
+    before, own, whole = 0.0, common.sweep_rate(fleet, i), 0.0
     for j in range(fleet.shape[0]):
-        weight = fleet[j].speed * fleet[j].sensor_range
+        weight = common.sweep_rate(fleet, j)
         other = _order(fleet[j].heading_east, fleet[j].heading_north, first_x, first_y)
         whole += weight
         if other < mine or (other == mine and j < i):
@@ -142,4 +143,4 @@ def own(memory: Records, i: int, east: float, north: float) -> bool:
     x, y = east - memory[i].launch_east, north - memory[i].launch_north
     after_left = memory[i].left_east * y - memory[i].left_north * x >= 0.0
     before_right = memory[i].right_east * y - memory[i].right_north * x < 0.0
-    return (after_left or before_right) if memory[i].wide != 0 else (after_left and before_right)
+    return bool((after_left or before_right) if memory[i].wide != 0 else (after_left and before_right))
