@@ -30,6 +30,12 @@ def _slot(has: Integers, i: int, serial: int) -> int:
 
 
 @kernel
+def _known(has: Integers, i: int, serial: int) -> bool:
+    """Whether ``serial`` is in the set, by its own place in it; one that had to move on may be denied."""
+    return bool(has[i, serial & (has.shape[1] - 1)] == serial + 1)
+
+
+@kernel
 def _forget(has: Integers, i: int, serial: int) -> None:
     """Take ``serial`` out of the set; those behind it that it had pushed on move up (Knuth, 6.4 R)."""
     mask = has.shape[1] - 1
@@ -73,7 +79,9 @@ def learn_seen(
     knowledge[i].before = knowledge[i].known
     knowledge[i].in_range = count
     for r in range(count):
-        _learn(knowledge, i, contacts, has, reports[i, r].id, reports[i, r].east, reports[i, r].north)
+        serial = reports[i, r].id
+        if not _known(has, i, serial):
+            _learn(knowledge, i, contacts, has, serial, reports[i, r].east, reports[i, r].north)
     knowledge[i].seen = knowledge[i].known - knowledge[i].before
 
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 from . import homing, know, radio, sense, stages, steering
 from .arrays import Floats, Integers, Records
+from .jit import kernel
 
 if TYPE_CHECKING:
     from .planners.bounce import start, tell
@@ -106,13 +107,21 @@ def period(
     return nearest
 
 
+@kernel
+def count_in_range(knowledge: Records, tick: int, in_range: Integers) -> None:
+    """Into row ``tick``: targets in range, summed over all vehicles, and how many vehicles have any."""
+    for i in range(knowledge.shape[0]):
+        in_range[tick, 0] += knowledge[i].in_range
+        in_range[tick, 1] += 1 if knowledge[i].in_range > 0 else 0
+
+
 def run_ideal(
     memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, rules: Records, settings: Records, wishes: Records, in_range: Integers,
 ) -> float:  # fmt: skip
-    """A whole search in ideal dynamics, x += v dt (eq. 2); ``in_range`` (ticks, V) counts targets in range.
+    """A whole search in ideal dynamics, x += v dt (eq. 2); ``in_range`` as count_in_range fills it.
 
     Returns how near (m) two vehicles came.
     """
@@ -124,8 +133,8 @@ def run_ideal(
             report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
         )  # fmt: skip
         nearest = min(nearest, squared)
+        count_in_range(knowledge, tick, in_range)
         for i in range(poses.shape[0]):
-            in_range[tick, i] = knowledge[i].in_range
             poses[i].v_east = wishes[i].v_east
             poses[i].v_north = wishes[i].v_north
             poses[i].east += wishes[i].v_east * rules[0].period
@@ -160,8 +169,7 @@ def run_multicopter(
                 memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
                 report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
             )  # fmt: skip
-            for i in range(poses.shape[0]):
-                in_range[tick, i] = knowledge[i].in_range
+            count_in_range(knowledge, tick, in_range)
         if begun >= 0 and ahead == in_range.shape[0] * per_period:
             orders[:] = 1
             homing.order_home(fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges)

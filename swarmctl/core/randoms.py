@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from .arrays import Floats
 from .jit import kernel
 
 # What a number is for.  Each purpose owns a range of streams so that no two draws share a key.
@@ -51,6 +52,13 @@ def uniform(seed: int, vehicle: int, tick: int, stream: int) -> float:
     bits = _absorb(_absorb(_absorb(_absorb(_GOLDEN, seed), vehicle), tick), stream)
     # 52 bits and a half: with 53 the half would be rounded away, and the greatest number be 1.
     return (float(bits >> _S12) + 0.5) * (1.0 / 4503599627370496.0)
+
+
+@kernel
+def uniforms(seed: int, stream: int, numbers: Floats) -> None:
+    """Fill ``numbers`` (V,) with one for each vehicle, at tick 0."""
+    for i in range(numbers.shape[0]):
+        numbers[i] = uniform(seed, i, 0, stream)
 
 
 @kernel

@@ -146,6 +146,18 @@ def cell_of(grid: Records, x: float, y: float) -> int:
 
 
 @kernel
+def bounds(places: Floats) -> tuple[float, float, float, float]:
+    """West, south, east and north of all ``places`` (T, 2); zeros if there are none."""
+    if places.shape[0] == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    west, south, east, north = places[0, 0], places[0, 1], places[0, 0], places[0, 1]
+    for t in range(1, places.shape[0]):
+        west, east = min(west, places[t, 0]), max(east, places[t, 0])
+        south, north = min(south, places[t, 1]), max(north, places[t, 1])
+    return west, south, east, north
+
+
+@kernel
 def sort_into(grid: Records, places: Floats, clusters: Integers, targets: Records, starts: Integers) -> None:
     """Copy the targets into ``targets`` sorted by cell, and fill in ``starts`` (cells + 1, 2).
 

@@ -6,6 +6,8 @@ noise; now and then the sensor reports something that is not there.  A real dete
 
 import math
 
+import numpy as np
+
 from . import scene
 from .arrays import Integers, Records
 from .jit import kernel
@@ -41,6 +43,61 @@ def _false_alarm(
 
 
 @kernel
+def _in_range(
+    fleet: Records, i: int, poses: Records, targets: Records, grid: Records, starts: Integers, now: float,
+    reports: Records,
+) -> int:  # fmt: skip
+    """Write every target within the sensor's radius into ``reports[i]``; returns how many.
+
+    As many as there is room for, less one for a false alarm.
+    """
+    reach = fleet[i].sensor_range
+    x, y = poses[i].east, poses[i].north
+    look = reach + WANDER_REACH * grid[0].wander
+    here = scene.cell_of(grid, x, y)
+    around = grid[0].block
+    if look > around * grid[0].cell:
+        around = int(look / grid[0].cell) + 1
+    elif starts[here, 1] == 0:
+        return 0  # empty ground, as mostly
+    row, column = here // grid[0].columns, here % grid[0].columns
+    west, east = max(column - around, 0), min(column + around, grid[0].columns - 1)
+    moving = grid[0].wander > 0.0
+    room = reports.shape[1] - 1
+    count = 0
+    for r in range(max(row - around, 0), min(row + around, grid[0].rows - 1) + 1):
+        first, last = starts[r * grid[0].columns + west, 0], starts[r * grid[0].columns + east + 1, 0]
+        # Unsigned, or every access would look whether the index counts from the end.
+        for t in range(np.uint64(first), np.uint64(last)):
+            tx, ty = targets[t].east, targets[t].north
+            if moving:
+                tx, ty = scene.place_at(grid, targets, t, now)
+            if (tx - x) * (tx - x) + (ty - y) * (ty - y) <= reach * reach and count < room:
+                count = _report(reports, count, i, t, tx, ty)
+    return count
+
+
+@kernel
+def _overlook(fleet: Records, i: int, rules: Records, tick: int, reports: Records, count: int) -> int:
+    """Take out of the reports what the detector misses; returns how many are left."""
+    left = 0
+    for c in range(count):
+        t = reports[i, c].id
+        if uniform(rules[0].seed, i, tick, DETECT + t) < fleet[i].detection_probability:
+            left = _report(reports, left, i, t, reports[i, c].east, reports[i, c].north)
+    return left
+
+
+@kernel
+def _misplace(fleet: Records, i: int, rules: Records, tick: int, reports: Records, count: int) -> None:
+    """Add the position noise."""
+    for c in range(count):
+        t = reports[i, c].id
+        reports[i, c].east += fleet[i].position_noise * normal(rules[0].seed, i, tick, NOISE + 2 * t)
+        reports[i, c].north += fleet[i].position_noise * normal(rules[0].seed, i, tick, NOISE + 2 * t + 1)
+
+
+@kernel
 def sense(
     fleet: Records, i: int, poses: Records, targets: Records, grid: Records, starts: Integers,
     alarms: Integers, rules: Records, tick: int, reports: Records, found: Integers,
@@ -50,40 +107,15 @@ def sense(
     ``alarms`` (V,) counts its false alarms, which numbers them; ``found`` (T,) keeps the first tick at
     which any vehicle reported the target (-1: not yet).
     """
-    seed = rules[0].seed
-    reach = fleet[i].sensor_range
-    x, y = poses[i].east, poses[i].north
     now = tick * rules[0].period
-    look = reach + WANDER_REACH * grid[0].wander
-    here = scene.cell_of(grid, x, y)
-    around = grid[0].block
-    empty = starts[here, 1] == 0
-    if look > around * grid[0].cell:
-        around = int(look / grid[0].cell) + 1
-        empty = False
-    row, column = here // grid[0].columns, here % grid[0].columns
-    west, east = max(column - around, 0), min(column + around, grid[0].columns - 1)
-    south, north = max(row - around, 0), min(row + around, grid[0].rows - 1)
-    count = 0
-    if empty:
-        north = south - 1  # no row to look through, as is mostly so
-    for r in range(south, north + 1):
-        first, last = r * grid[0].columns + west, r * grid[0].columns + east
-        for t in range(starts[first, 0], starts[last + 1, 0]):
-            tx, ty = scene.place_at(grid, targets, t, now)
-            if (tx - x) * (tx - x) + (ty - y) * (ty - y) > reach * reach:
-                continue
-            chance = fleet[i].detection_probability
-            if chance < 1.0 and uniform(seed, i, tick, DETECT + t) >= chance:
-                continue
-            noise = fleet[i].position_noise
-            if noise > 0.0:
-                tx += noise * normal(seed, i, tick, NOISE + 2 * t)
-                ty += noise * normal(seed, i, tick, NOISE + 2 * t + 1)
-            if count < reports.shape[1] - 1:  # room is kept for a false alarm
-                count = _report(reports, count, i, t, tx, ty)
-            if found[t] < 0:
-                found[t] = tick
+    count = _in_range(fleet, i, poses, targets, grid, starts, now, reports)
+    if fleet[i].detection_probability < 1.0:
+        count = _overlook(fleet, i, rules, tick, reports, count)
+    if fleet[i].position_noise > 0.0:
+        _misplace(fleet, i, rules, tick, reports, count)
+    for c in range(count):
+        if found[reports[i, c].id] < 0:
+            found[reports[i, c].id] = tick
     if fleet[i].alarms_per_second > 0.0:
         count = _false_alarm(fleet, i, poses, alarms, rules, tick, reports, count)
     return count

@@ -60,8 +60,9 @@ BEACON = record(
     integers=("in_range", "on_visit", "best", "first", "last"),
 )  # fmt: skip
 
-# What every planner remembers; a planner's own memory begins with these fields.
-COMMON_MEMORY = ("heading_east", "heading_north", "throttle")
+# What every planner remembers; a planner's own memory begins with these fields.  `clear` is a circle that no fence
+# reaches into (planners/common.py).
+COMMON_MEMORY = ("heading_east", "heading_north", "throttle", "clear_east", "clear_north", "clear_radius")
 
 # What a planner wants for the coming period: a velocity.
 WISH = record("v_east", "v_north")

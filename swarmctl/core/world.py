@@ -36,16 +36,16 @@ class Fences:
 def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander_mps: float = 0.0,
                reach_m: float = 200.0) -> Scene:  # fmt: skip
     """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m`` (at most 256 × 256 cells)."""
-    low = places.min(axis=0) if len(places) else np.zeros(2)
-    extent = places.max(axis=0) - low if len(places) else np.zeros(2)
-    cell = max(reach_m, float(extent.max()) / 255.0)
+    places = np.ascontiguousarray(places, np.float64)
+    west, south, east, north = calls.bounds(places)
+    cell = max(reach_m, max(east - west, north - south) / 255.0)
     grid = np.zeros(1, state.GRID)
-    columns, rows = (int(extent[k] // cell) + 1 for k in range(2))
+    columns, rows = int((east - west) // cell) + 1, int((north - south) // cell) + 1
     block = math.ceil((reach_m + WANDER_REACH * wander_m) / cell - 1e-9)
-    grid[0] = (low[0], low[1], cell, columns, rows, block, wander_m, wander_mps)
+    grid[0] = (west, south, cell, columns, rows, block, wander_m, wander_mps)
     targets = np.zeros(len(places), state.TARGET)
     starts = np.zeros((columns * rows + 1, 2), np.int64)
-    calls.sort_into(grid, np.ascontiguousarray(places), clusters, targets, starts)
+    calls.sort_into(grid, places, clusters, targets, starts)
     return Scene(targets, grid, starts)
 
 
@@ -61,6 +61,9 @@ def make_settings(algorithm: str, parameters: dict[str, float]) -> Records:
 def power_of_two(least: int) -> int:
     """The least power of two that is not below ``least``."""
     return 1 << max(least - 1, 0).bit_length()
+
+
+GIVEN = ("fleet", "rules", "settings")  # a world's arrays that say what is flown; the others are its state
 
 
 class World:
@@ -100,7 +103,22 @@ class World:
         self.setpoints = np.zeros(count, state.SETPOINT)
         self.sent: Floats = np.zeros((count, MOST_UNDER_WAY + 1, 2))
         self.orders: Integers = np.zeros(count, np.int64)
-        self.nearest_m = float("nan")  #: the nearest two vehicles came in a run of ideal dynamics
+        self.nearest_m = math.nan  #: how near two vehicles came in a run of ideal dynamics
+        # Targets in range, a row a period: their sum over the vehicles, and how many vehicles had any.
+        self.in_range: Integers = np.zeros((round(rules[0]["duration"] / rules[0]["period"]), 2), np.int64)
+        mine = (a for n, a in vars(self).items() if isinstance(a, np.ndarray) and n not in GIVEN)
+        self._bytes = [array.reshape(-1).view(np.uint8) for array in mine]
+
+    def restart(self, fleet: Records, rules: Records, scene: Scene) -> None:
+        """Put everything back to its start for another run of the same size: the same bytes as a new world's.
+
+        Memory that has been used before needs not be mapped anew, which would take as long as the run.
+        """
+        self.fleet, self.rules, self.scene = fleet, rules, scene
+        for data in self._bytes:
+            data.fill(0)
+        self.found.fill(-1)
+        self.nearest_m = math.nan
 
     @property
     def serials(self) -> int:
@@ -174,25 +192,21 @@ class World:
         )  # fmt: skip
 
     def run_ideal(self) -> Integers:
-        """Search in ideal dynamics to the end; returns targets in range (ticks, V)."""
-        in_range = np.zeros(
-            (round(self.rules[0]["duration"] / self.rules[0]["period"]), len(self.fleet)), np.int64
-        )
+        """Search in ideal dynamics to the end; returns ``in_range`` (periods, 2)."""
         self.nearest_m = self.kernels.run_ideal(
             self.memory, self.fleet, self.poses, self.knowledge, self.contacts, self.has, self.told,
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.rules,
-            self.settings, self.wishes, in_range,
+            self.settings, self.wishes, self.in_range,
         )  # fmt: skip
-        return in_range
+        return self.in_range
 
     def run_multicopter(self, most_s: float = 7200.0) -> tuple[Integers, Floats, float]:
         """Fly the whole mission in a multicopter's dynamics, take-off to landing.
 
-        Returns targets in range (ticks, V); the account of steering.watch; and the flight's length in s.
+        Returns ``in_range`` (periods, 2); the account of steering.watch; and the flight's length in s.
         """
         rules = self.rules[0]
-        in_range = np.zeros((round(rules["duration"] / rules["period"]), len(self.fleet)), np.int64)
         account = np.array([np.inf, 0.0, 0.0, 0.0])
         most = round((most_s + rules["duration"]) / rules["interval"])
         ticks = self.kernels.run_multicopter(
@@ -200,6 +214,6 @@ class World:
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.fences.guard,
             self.fences.raw, self.rules, self.settings, self.wishes, self.errands, self.paths, self.wants,
-            self.sent, self.setpoints, self.orders, in_range, account, most,
+            self.sent, self.setpoints, self.orders, self.in_range, account, most,
         )  # fmt: skip
-        return in_range, account, ticks * float(rules["interval"])
+        return self.in_range, account, ticks * float(rules["interval"])

@@ -12,7 +12,7 @@ import shapely
 from scipy.optimize import linear_sum_assignment
 
 from swarmctl.core.arrays import Floats
-from swarmctl.core.calls import uniform
+from swarmctl.core.calls import uniforms
 from swarmctl.core.randoms import LAUNCH
 
 from .geometry import Regions
@@ -56,15 +56,16 @@ def ideal_start(regions: Regions) -> Floats:
     return corner
 
 
-def draw_headings(mission: Mission, regions: Regions, starts: Floats, seed: int) -> Floats:
-    """Initial headings (V,) in radians from east, one drawn for each vehicle at ``starts`` (V, 2)."""
-    first, width = _opening(mission, regions, starts)
-    draws = np.array([uniform(seed, i, 0, LAUNCH) for i in range(len(starts))])
+def draw_headings(opening: tuple[float, float], count: int, seed: int) -> Floats:
+    """Initial headings (count,) in radians from east, one drawn for each vehicle from an :func:`opening`."""
+    draws = np.empty(count)
+    uniforms(seed, LAUNCH, draws)
+    first, width = opening
     return first + width * draws
 
 
-def _opening(mission: Mission, regions: Regions, starts: Floats) -> tuple[float, float]:
-    """The first heading and the width of the range that headings are drawn from."""
+def opening(mission: Mission, regions: Regions, starts: Floats) -> tuple[float, float]:
+    """The first heading and the width of the range that headings are drawn from, vehicles at ``starts`` (V, 2)."""
     if mission.launch != "corner":
         return 0.0, 2.0 * math.pi
     if mission.area.size_m is not None:

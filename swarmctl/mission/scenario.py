@@ -58,26 +58,35 @@ class Scenario:
         r = self.regions
         return Fences(r.raw, r.raw if self.ideal else r.plan, r.guard)
 
+    @cached_property
+    def _standing(self) -> Records:
+        """The vehicles (V,) VEHICLE on their pads, without headings."""
+        fleet = np.zeros(len(self.mission.fleet), state.VEHICLE)
+        for row, vehicle in zip(fleet, self.mission.fleet, strict=True):
+            _describe(row, vehicle, self.mission)
+        fleet["pad_east"], fleet["pad_north"] = self.starts.T
+        return fleet
+
     def fleet(self, seed: int) -> Records:
         """The vehicles (V,) VEHICLE, with this seed's initial headings."""
-        mission = self.mission
-        fleet = np.zeros(len(mission.fleet), state.VEHICLE)
-        for row, vehicle in zip(fleet, mission.fleet, strict=True):
-            _describe(row, vehicle, mission)
-        fleet["pad_east"], fleet["pad_north"] = self.starts.T
-        headings = launch.draw_headings(mission, self.regions, self.starts, seed)
+        fleet = self._standing.copy()
+        headings = launch.draw_headings(self._opening, len(fleet), seed)
         if not self.ideal:
             headings = launch.uncross(self.starts, headings)
         fleet["heading_east"], fleet["heading_north"] = np.cos(headings), np.sin(headings)
         return fleet
 
-    def rules(self, seed: int, targets: int) -> Records:
-        """What holds for the whole run, (1,) RULES."""
+    @cached_property
+    def _opening(self) -> tuple[float, float]:
+        return launch.opening(self.mission, self.regions, self.starts)
+
+    @cached_property
+    def _rules(self) -> Records:
+        """What holds for all runs, (1,) RULES."""
         mission = self.mission
         period = mission.planner.period_s
         rules = np.zeros(1, state.RULES)
         row = rules[0]
-        row["seed"], row["targets"] = seed, targets
         row["period"], row["interval"] = period, 1.0 / mission.setpoints.rate_hz
         row["separation"], row["duration"] = mission.safety.separation_m, mission.duration_s
         row["metric"], row["ideal"] = mission.planner.terms == "metric", self.ideal
@@ -86,25 +95,43 @@ class Scenario:
         row["landing_speed"] = LANDING_MPS
         return rules
 
+    def rules(self, seed: int, targets: int) -> Records:
+        """What holds for the whole run, (1,) RULES."""
+        rules = self._rules.copy()
+        rules["seed"], rules["targets"] = seed, targets
+        return rules
+
+    @cached_property
+    def _sees_furthest_m(self) -> float:
+        return max(vehicle.sensor.range_m for vehicle in self.mission.fleet)
+
     def scene(self, seed: int) -> Scene:
         """What there is to find with this seed."""
         wanted = self.mission.targets
         places, clusters = self._placed() if wanted.positions_m is not None else self._drawn(seed)
         wander = WANDER_SHARE * wanted.radius_m if wanted.motion == "wander" else 0.0
-        cell = max(v.sensor.range_m for v in self.mission.fleet)
-        return make_scene(places, clusters, wander, WANDER_MPS, cell)
+        return make_scene(places, clusters, wander, WANDER_MPS, self._sees_furthest_m)
 
-    def world(self, seed: int, algorithm: str | None = None) -> World:
-        """All arrays of one run, vehicles standing at their start."""
+    def world(self, seed: int, algorithm: str | None = None, again: World | None = None) -> World:
+        """All arrays of one run, vehicles standing at their start.
+
+        ``again`` is a world of this scenario and algorithm that is not needed any more: its arrays are used again.
+        """
         name = algorithm or self.mission.planner.algorithm
         scene = self.scene(seed)
-        given = self.mission.planner.parameters.get(name, {})
-        settings = make_settings(name, {k: float(v) for k, v in given.items()})
-        world = World(
-            name, self.fleet(seed), self.rules(seed, len(scene.targets)), scene, self.fences, settings
-        )
+        fleet, rules = self.fleet(seed), self.rules(seed, len(scene.targets))
+        if again is None:
+            world = World(name, fleet, rules, scene, self.fences, self.settings(name))
+        else:
+            world = again
+            world.restart(fleet, rules, scene)
         world.poses["east"], world.poses["north"] = self.starts.T
         return world
+
+    def settings(self, algorithm: str) -> Records:
+        """An algorithm's parameters, (1,): as the mission gives them, the others at their defaults."""
+        given = self.mission.planner.parameters.get(algorithm, {})
+        return make_settings(algorithm, {k: float(v) for k, v in given.items()})
 
     def _placed(self) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
         places = np.array(self.mission.targets.positions_m, dtype=float).reshape(-1, 2)

@@ -64,8 +64,10 @@ def simulate(job: Job) -> Records:
     """Fly every seed of the job; one RUN record each, in the seeds' order."""
     scenario = Scenario(job.mission, ideal=job.ideal)
     runs = np.zeros(len(job.seeds), RUN)
+    moments = curve_times(job.mission.duration_s)
+    world: World | None = None
     for run, seed in zip(runs, job.seeds, strict=True):
-        world = scenario.world(seed, job.algorithm)
+        world = scenario.world(seed, job.algorithm, world)
         run["seed"] = seed
         if job.ideal:
             in_range = world.run_ideal()
@@ -75,21 +77,18 @@ def simulate(job: Job) -> Records:
             run["min_separation_m"], run["outside"], run["flight_s"] = account[0], account[1], length
             run["standing"] = account[2] / account[3] if account[3] > 0 else 0.0
             run["not_down"] = (world.errands["stage"] != stages.LANDED).sum()
-        _take_figures(run, world, in_range)
+        _take_figures(run, world, in_range, moments)
     return runs
 
 
-def _take_figures(run: np.void, world: World, in_range: Integers) -> None:
+def _take_figures(run: np.void, world: World, in_range: Integers, moments: Floats) -> None:
     """Fill in what both dynamics have."""
-    rules = world.rules[0]
-    found = np.sort(np.where(world.found < 0, np.inf, world.found * float(rules["period"])))
-    count = len(found)
-    for k, percent in enumerate(LEVELS_PERCENT):
-        needed = -(-percent * count // 100)  # rounded up
-        run["time_s"][k] = found[needed - 1] if needed else np.inf
-    upto = np.searchsorted(found, curve_times(float(rules["duration"])), side="right")
-    run["curve"] = upto / max(count, 1)
-    run["final_fraction"] = np.isfinite(found).sum() / max(count, 1)
-    any_there = in_range > 0
-    run["in_range"] = in_range.mean()
-    run["in_range_when_any"] = in_range[any_there].mean() if any_there.any() else 0.0
+    found = np.sort(world.found[world.found >= 0]) * float(world.rules[0]["period"])
+    count = len(world.found)
+    needed = [-(-percent * count // 100) for percent in LEVELS_PERCENT]  # rounded up
+    run["time_s"] = [found[n - 1] if 0 < n <= len(found) else np.inf for n in needed]
+    run["curve"] = found.searchsorted(moments, side="right") / max(count, 1)
+    run["final_fraction"] = len(found) / max(count, 1)
+    total, steps_with_any = in_range.sum(axis=0)
+    run["in_range"] = total / (len(in_range) * len(world.fleet))
+    run["in_range_when_any"] = total / steps_with_any if steps_with_any else 0.0

@@ -56,7 +56,9 @@ def test_handing_out_is_needed() -> None:
     mission = paper(vehicles__count=12)
     regions = geometry.regions(mission)
     starts = Scenario(mission, ideal=False).starts
-    drawn = [launch.draw_headings(mission, regions, starts, seed) for seed in range(5)]
+    drawn = [
+        launch.draw_headings(launch.opening(mission, regions, starts), len(starts), seed) for seed in range(5)
+    ]
     assert all(crossings(starts, headings) > 0 for headings in drawn)
 
 
@@ -108,7 +110,9 @@ def test_ideal_vehicles_start_together_on_the_border_and_drawn_headings_are_kept
     mission = paper()
     scenario = Scenario(mission, ideal=True)
     assert scenario.starts.tolist() == [[0.0, 0.0]] * 6
-    drawn = launch.draw_headings(mission, scenario.regions, scenario.starts, 5)
+    drawn = launch.draw_headings(
+        launch.opening(mission, scenario.regions, scenario.starts), len(scenario.starts), 5
+    )
     assert headings_of(scenario.world(5)) == pytest.approx(drawn)
     assert scenario.fences.plan is scenario.fences.raw
     assert scenario.fences.plan[:, 0].max() == 5000.0

@@ -75,9 +75,38 @@ def look_ahead(fleet: Records, i: int, rules: Records) -> float:
 
 
 @kernel
+def _known_clear(memory: Records, i: int, x: float, y: float, reach: float) -> bool:
+    """Whether all that lies within ``reach`` of (x, y) is in the circle that no fence reaches into."""
+    room = memory[i].clear_radius - reach
+    dx, dy = x - memory[i].clear_east, y - memory[i].clear_north
+    return bool(room > 0.0 and dx * dx + dy * dy < room * room)
+
+
+@kernel
+def _look_about(memory: Records, i: int, edges: Floats, x: float, y: float) -> None:
+    """Remember the circle round (x, y) that no fence reaches into; none where that is outside."""
+    memory[i].clear_radius = 0.0
+    if fence.inside(edges, x, y):
+        near_x, near_y = fence.nearest(edges, x, y)
+        dx, dy = near_x - x, near_y - y
+        # Less what rounding could hide.
+        memory[i].clear_radius = math.sqrt(dx * dx + dy * dy) * (1.0 - 1e-9) - 1e-6
+    memory[i].clear_east, memory[i].clear_north = x, y
+
+
+@kernel
 def blocked(memory: Records, i: int, poses: Records, edges: Floats, reach: float) -> bool:
-    """Whether the fence lies within ``reach`` metres ahead along the commanded direction."""
+    """Whether the fence lies within ``reach`` metres ahead along the commanded direction.
+
+    Far from any fence, which is mostly, the circle remembered says so at once.
+    """
     x, y = poses[i].east, poses[i].north
+    if _known_clear(memory, i, x, y, reach):
+        return False
+    if x != memory[i].clear_east or y != memory[i].clear_north:
+        _look_about(memory, i, edges, x, y)
+        if _known_clear(memory, i, x, y, reach):
+            return False
     ahead_x = x + reach * memory[i].heading_east
     ahead_y = y + reach * memory[i].heading_north
     return not fence.legal(edges, x, y, ahead_x, ahead_y)
