@@ -92,11 +92,16 @@ def _condition(cases: Sequence[Case], names: Sequence[str]) -> str | None:
     if len(under) == 1:
         return next(iter(under))
     parts = [
-        f"{names[0]} {' or '.join(values)}" + (f" and {rest}" if rest else "")
+        f"{names[0]} {either(values)}" + (f" and {rest}" if rest else "")
         for rest, values in under.items()
         if rest is not None
     ]
     return "; or ".join(parts)
+
+
+def either(words: Sequence[str]) -> str:
+    """``a``, ``a or b``, ``a, b or c``."""
+    return " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def every(verdicts: Iterable[Verdict]) -> Verdict:

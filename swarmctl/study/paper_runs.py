@@ -1,9 +1,9 @@
 """The runs behind ``swarmctl paper``: who flies them, and where judges and figures find them.
 
-Three kinds.  *Common* runs start at the first seed, for every variant.  *Counted* runs are flown again for a figure
-that RUN does not have: which cluster's targets were found, and who ends where (CENSUS).  *Fresh* runs, on seeds that
-nothing else saw, compare points of the parameter triangle that were chosen for being good on the common ones: a
-winner among 66 is partly lucky, and only new layouts tell by how much.
+Three kinds.  *Common* runs start at the first seed, for every variant.  *Counted* runs are flown step by step for
+what RUN does not have (paper_census.py).  *Fresh* runs, on seeds that nothing else saw, compare points of the
+parameter triangle that were chosen for being good on the common ones: a winner among 66 is partly lucky, and only
+new layouts tell by how much.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,56 +12,15 @@ from concurrent.futures import Executor
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
-from swarmctl.core.world import World
-from swarmctl.mission.scenario import Scenario
 
 from .execute import Done, Simulate, jobs_of, run_jobs
+from .paper_census import census
 from .paper_variants import Variant, Weights, counted, readings, triangle, wanted, weighted
-from .runs import LEVELS_PERCENT, Job, simulate
-
-# Of one run: how many clusters had any target found and how many all of theirs, the mean share found of those that
-# had any, and how many vehicles have the same cluster in range in the end.
-CENSUS = np.dtype([("visited", "<i8"), ("complete", "<i8"), ("share", "<f8"), ("gathered", "<i8")])
+from .runs import LEVELS_PERCENT, simulate
 
 Batch = tuple[Variant, range]
 Contest = dict[tuple[str, float], tuple[Weights, Weights]]
 """For each reading: the point that is claimed to be best, and its strongest rival."""
-
-
-def census(job: Job) -> Records:
-    """Fly every seed of the job in ideal dynamics; one CENSUS record each."""
-    scenario = Scenario(job.mission, ideal=True)
-    told = np.zeros(len(job.seeds), CENSUS)
-    world: World | None = None
-    for row, seed in zip(told, job.seeds, strict=True):
-        world = scenario.world(seed, job.algorithm, world)
-        world.run_ideal()
-        shares = _shares_found(world)
-        visited = shares[shares > 0]
-        row["visited"], row["complete"] = len(visited), (shares == 1).sum()
-        row["share"] = visited.mean() if len(visited) else 0.0
-        row["gathered"] = gathered(world)
-    return told
-
-
-def _shares_found(world: World) -> Floats:
-    """The share found of each cluster's targets."""
-    clusters = world.scene.targets["cluster"]
-    every = np.bincount(clusters)
-    return np.bincount(clusters, world.found >= 0) / np.maximum(every, 1)
-
-
-def gathered(world: World) -> int:
-    """How many vehicles have targets of one and the same cluster in range now: the most of any cluster."""
-    targets = world.scene.targets
-    apart = np.hypot(
-        world.poses["east"][:, None] - targets["east"], world.poses["north"][:, None] - targets["north"]
-    )
-    near = apart <= world.fleet["sensor_range"][:, None]
-    most = 0
-    for cluster in np.unique(targets["cluster"]):
-        most = max(most, int(near[:, targets["cluster"] == cluster].any(axis=1).sum()))
-    return most
 
 
 def fly(batches: Sequence[Batch], executor: Executor, done: Done, run: Simulate = simulate) -> list[Records]:

@@ -4,9 +4,10 @@ A :class:`Variant` says what differs from missions/paper.yaml.  Every variant st
 of any two pair up seed by seed, as far as the shorter goes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 
 from swarmctl.core import planners
 from swarmctl.mission.load import load
@@ -51,8 +52,8 @@ class Variant:
 
 
 def variant(
-    algorithm: str, terms: str = "unit", *, radio_m: float | None = None, vehicles: int | None = None,
-    **parameters: float,
+    algorithm: str, terms: str = "unit", parameters: Mapping[str, float] = MappingProxyType({}), *,
+    radio_m: float | None = None, vehicles: int | None = None,
 ) -> Variant:  # fmt: skip
     """A variant; parameters at their default are left out, so that what flies alike is one variant."""
     defaults = {p.name: p.default for p in planners.module(algorithm).PARAMETERS}
@@ -71,14 +72,14 @@ def _base(algorithm: str, terms: str, radio_m: float | None, vehicles: int | Non
     return load(None, {key: value for key, value in given.items() if value is not None})
 
 
-def mdc(terms: str = "unit", random: float = 0.05, **parameters: float) -> Variant:
+def mdc(terms: str = "unit", random: float = 0.05) -> Variant:
     """MDC with that random vector."""
-    return variant("mdc", terms, random=random, **parameters)
+    return variant("mdc", terms, {"random": random})
 
 
-def fco(terms: str = "unit", random: float = 0.05, **parameters: float) -> Variant:
+def fco(terms: str = "unit", random: float = 0.05) -> Variant:
     """FCO with that random vector."""
-    return variant("fco", terms, random=random, **parameters)
+    return variant("fco", terms, {"random": random})
 
 
 def dpso_u(terms: str = "unit", random: float = 0.0) -> Variant:
@@ -93,12 +94,12 @@ def silent(flown: Variant) -> Variant:
 
 def without_revisit(terms: str = "unit") -> Variant:
     """FCO that never flies back."""
-    return variant("fco", terms, revisit_s=NEVER_S)
+    return variant("fco", terms, {"revisit_s": NEVER_S})
 
 
-def without_jump_out(terms: str = "unit", **weights: float) -> Variant:
+def without_jump_out(terms: str = "unit") -> Variant:
     """MDC that stays wherever nothing better turns up."""
-    return variant("mdc", terms, jump_out_s=NEVER_S, **weights)
+    return variant("mdc", terms, {"jump_out_s": NEVER_S})
 
 
 def many(terms: str = "unit") -> Variant:
@@ -108,7 +109,7 @@ def many(terms: str = "unit") -> Variant:
 
 def ace(spacing_m: float = 300.0) -> Variant:
     """ACE with lanes so far apart."""
-    return variant("ace", spacing_m=spacing_m)
+    return variant("ace", parameters={"spacing_m": spacing_m})
 
 
 Weights = tuple[int, int, int]
@@ -123,7 +124,7 @@ def triangle() -> list[Weights]:
 def weighted(weights: Weights, terms: str, random: float) -> Variant:
     """MDC at a point of the triangle."""
     w, p, g = (value / STEPS for value in weights)
-    return variant("mdc", terms, random=random, inertia=w, personal=p, **{"global": g})
+    return variant("mdc", terms, {"random": random, "inertia": w, "personal": p, "global": g})
 
 
 def readings() -> Iterator[tuple[str, float]]:
@@ -147,8 +148,8 @@ EXTREME = {
 def extreme(weights: tuple[float, float, float], jump_out: bool) -> Variant:
     """MDC at extreme weights, with or without the jump-out."""
     w, p, g = weights
-    waits = {} if jump_out else {"jump_out_s": NEVER_S}
-    return variant("mdc", inertia=w, personal=p, **{"global": g}, **waits)
+    changed = {"inertia": w, "personal": p, "global": g}
+    return variant("mdc", parameters=changed if jump_out else {**changed, "jump_out_s": NEVER_S})
 
 
 def wanted(runs: int) -> dict[Variant, int]:
@@ -169,8 +170,8 @@ def wanted(runs: int) -> dict[Variant, int]:
 
 
 def counted(runs: int) -> dict[Variant, int]:
-    """How many runs are looked at cluster by cluster (see paper_runs.census)."""
-    quarter = max(2, runs // 4)
+    """How many runs of each are looked at step by step (paper_census.py)."""
+    tenth = max(2, runs // 10)
     found = [*(ace(spacing) for spacing in SPACINGS_M), mdc(), fco()]
     gathered = [extreme(weights, jump) for weights in EXTREME.values() for jump in (True, False)]
-    return dict.fromkeys([*found, *gathered], quarter)
+    return dict.fromkeys([*found, *gathered], tenth)
