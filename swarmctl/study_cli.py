@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 MOST_RUNS = 1_000_000
 PathArgument = click.Path(path_type=Path)
+Check = Callable[[], None]
+"""Raises KeyboardInterrupt if somebody asked to stop."""
 
 
 class AlgorithmsType(click.ParamType):  # type: ignore[type-arg]
@@ -77,24 +79,24 @@ def study(
 
     Run k of every algorithm has the same layout.  A mission without dynamics is flown in ideal dynamics.
     """
-    with plain_errors(), stopping(), ExitStack() as ending:
+    with plain_errors(), stopping() as check, ExitStack() as ending:
         from .flight.fly import default_folder
         from .study.plan import make_plan
         from .study.study import Study
 
         flags = {"vehicles.count": vehicles, "duration_s": duration}
-        given = {key: value for key, value in flags.items() if value is not None}
+        given: dict[str, object] = {key: value for key, value in flags.items() if value is not None}
         under_way = Study(make_plan(mission_file, algorithms, range(seed, seed + runs), given, sets))
         folder = default_folder(out, "study")
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, address))
         try:
-            _fly(under_way, executor)
+            _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
-            _keep(under_way, folder, as_json)
             raise
-        _keep(under_way, folder, as_json)
+        finally:  # whatever ended it, what is finished is kept
+            _keep(under_way, folder, as_json)
 
 
 def executor_of(workers: int | None, address: str | None) -> "AbstractContextManager[Executor]":
@@ -111,28 +113,36 @@ def executor_of(workers: int | None, address: str | None) -> "AbstractContextMan
 
 
 @contextmanager
-def stopping() -> Iterator[None]:
-    """Ctrl-C (SIGTERM, or a closed terminal) once: KeyboardInterrupt, and exit 4 after it; twice: exit 4 at once."""
-    times = 0
+def stopping() -> Iterator[Check]:
+    """Ctrl-C (SIGTERM, or a closed terminal) once: KeyboardInterrupt, and exit 4 after it; twice: exit 4 at once.
 
-    def stop(*_: Any) -> None:
-        nonlocal times
-        times += 1
-        if times > 1:
+    The first may fall into a destructor, which no exception leaves; so what is given is to be called now and then,
+    and stops what missed it.
+    """
+    asked: list[int] = []
+
+    def stop(number: int, frame: object) -> None:
+        asked.append(number)
+        if len(asked) > 1:
             os._exit(ABORTED)  # threads that are in the middle of a run can be ended in no other way
         raise KeyboardInterrupt
 
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
+
     before: dict[int, Any] = {number: signal.signal(number, stop) for number in INTERRUPTIONS}
     try:
-        yield
+        yield check
     except KeyboardInterrupt:
+        say("stopped")
         sys.exit(ABORTED)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def _fly(under_way: "Study", executor: "Executor") -> None:
+def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     """Do the runs, and show how far they are."""
     from .flight.clock import wall_s
 
@@ -143,7 +153,7 @@ def _fly(under_way: "Study", executor: "Executor") -> None:
         )
     )
     say(_intention(plan))
-    with _progress(plan) as (done, finished):
+    with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)
     steps = under_way.steps_per_s
     say(f"{plan.runs} runs in {under_way.wall_s:.1f} s: {steps / 1e6:.2f} million vehicle-steps a second")
@@ -159,21 +169,26 @@ def _intention(plan: "Plan") -> str:
 
 
 @contextmanager
-def _progress(plan: "Plan") -> "Iterator[tuple[Callable[[int], None], Callable[[Cell, str], None]]]":
+def _progress(
+    plan: "Plan", check: Check
+) -> "Iterator[tuple[Callable[[int], None], Callable[[Cell, str], None]]]":
     """A bar on a terminal, a line for each algorithm that is finished elsewhere; on stderr."""
-    if not sys.stderr.isatty():
-        yield (lambda runs: None), (lambda cell, name: say(_finished(plan, cell, name)))
-        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("runs", total=plan.runs)
-        yield (
-            lambda runs: bar.update(task, advance=runs),
-            lambda cell, name: bar.console.print(_finished(plan, cell, name), markup=False, highlight=False),
-        )
+
+        def done(runs: int) -> None:
+            check()
+            bar.update(task, advance=runs)
+
+        def finished(cell: "Cell", name: str) -> None:
+            console.print(_finished(plan, cell, name), markup=False, highlight=False, soft_wrap=True)
+
+        yield done, finished
 
 
 def _finished(plan: "Plan", cell: "Cell", name: str) -> str:

@@ -1,10 +1,11 @@
 """``swarmctl tune``: an algorithm's best setting, found on training seeds and told on fresh ones."""
 
 import json
+import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,19 @@ import click
 
 from .console import ABORTED, BAD_INPUT, INTERRUPTIONS, plain_errors, say
 from .core.planners import MODULES
+from .study_cli import executor_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from .study.tune import Question, Told
+    from .mission.model import Mission
+    from .record.folder import RunFolder
+    from .study.tune import Question, Told, Trials
     from .study.tuned import Answer
 
 METRICS = ("t25", "t50", "t75", "t85", "t95", "final", "in_range")
 MOST_SEED, MOST_RUNS = 999_999, 1_000_000  # training and fresh seeds never meet
+Check = Callable[[], None]
 TRIALS, ANSWER, YAML = "trials.db", "tune.json", "planner.yaml"
 
 
@@ -67,19 +72,18 @@ def tune(
 
     Prints the planner section of a mission.  Parameters that the mission or --set gives are held.
     """
-    with plain_errors():
-        from .mission.load import load
+    with plain_errors(), ExitStack() as ending:
         from .study.tune import Question
 
-        mission = load(mission_file, {**_settings(settings), "planner.algorithm": algorithm})
-        question = Question(mission, algorithm, metric, runs, seed)
+        question = Question(_mission(mission_file, algorithm, settings), algorithm, metric, runs, seed)
         folder = _folder(out, algorithm)
+        ending.callback(folder.remove_if_empty)
         with (
-            stoppable(f"go on with: --out {folder}"),
-            _locked(folder),
-            _workers(workers, address) as executor,
+            stoppable(f"go on with: --out {folder.path}") as check,
+            _alone(folder),
+            executor_of(workers, address) as executor,
         ):
-            found = _tune(question, trials, fresh, folder, executor)
+            found = _tune(question, trials, fresh, folder, executor, check)
         _write(found, folder)
         if as_json:
             click.echo(json.dumps(found.as_json(), indent=2, allow_nan=False))
@@ -87,65 +91,64 @@ def tune(
             click.echo(text(found), nl=False)
 
 
-def _settings(given: Sequence[str]) -> dict[str, object]:
-    """Dotted keys and their values, read as a mission file's."""
-    from .mission import yaml_reader
+def _mission(mission_file: Path | None, algorithm: str, sets: Sequence[str]) -> "Mission":
+    """The mission with what --set says over it; a study's, but that no key can vary."""
+    from .study.errors import StudyError
+    from .study.plan import make_plan
 
-    pairs: dict[str, object] = {}
-    for setting in given:
-        key, equals, value = setting.partition("=")
-        if not key or not equals:
-            raise click.UsageError(f"--set {setting}: write KEY=VALUE")
-        pairs[key] = yaml_reader.read(value.encode(), "command line").data
-    return pairs
+    plan = make_plan(mission_file, [algorithm], range(1), {}, sets)
+    if plan.varied:
+        raise StudyError(f"--set {plan.varied[0].key}: tuning is for one mission (give one value)")
+    return plan.cells[0].missions[algorithm]
 
 
-def _folder(out: Path | None, algorithm: str) -> Path:
+def _folder(out: Path | None, algorithm: str) -> "RunFolder":
     """The folder of the trials: a new one, or ``out`` if it has trials."""
     from .flight.fly import default_folder
+    from .record.folder import RunFolder
 
     if out is not None and (out / TRIALS).is_file():
-        return out
-    return default_folder(out, f"tune-{algorithm}").path
+        return RunFolder(out)
+    return default_folder(out, f"tune-{algorithm}")
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def _alone(folder: "RunFolder") -> Iterator[None]:
     """Keep another tuning out of the folder."""
     import fcntl
 
-    with (folder / ".lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            say(f"{folder}: another tuning is at work there")
-            sys.exit(BAD_INPUT)
+    lock = os.open(folder.path, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
-
-
-def _workers(workers: int | None, address: str | None) -> "AbstractContextManager[Executor]":
-    """Threads here, or a cluster."""
-    if address is None:
-        from .study.execute import local
-
-        return local(workers)
-    if workers is not None:
-        raise click.UsageError("--cluster has workers of its own: no --workers can be given")
-    from .study.cluster import cluster
-
-    return cluster(address, say)
+    except BlockingIOError:
+        say(f"{folder.path}: another tuning is at work there")
+        sys.exit(BAD_INPUT)
+    finally:
+        os.close(lock)
 
 
 @contextmanager
-def stoppable(how_on: str) -> Iterator[None]:
-    """Ctrl-C (SIGTERM, or a closed terminal): stop, say how to go on, and exit as aborted."""
+def stoppable(how_on: str) -> Iterator[Check]:
+    """Ctrl-C (SIGTERM, or a closed terminal): stop, say how to go on, and exit as aborted.
 
-    def stop(*_: Any) -> None:
+    The interrupt may fall into a destructor or a callback of compiled code, which no exception leaves; so what is
+    given is to be called now and then, and stops what missed it.
+    """
+    asked: list[int] = []
+
+    def stop(number: int, frame: object) -> None:
+        asked.append(number)
         raise KeyboardInterrupt
+
+    def check() -> None:
+        if asked:
+            raise KeyboardInterrupt
 
     before: dict[int, Any] = {n: signal.signal(n, stop) for n in INTERRUPTIONS}
     try:
-        yield
+        yield check
+        check()
     except KeyboardInterrupt:
         say(f"stopped; what was finished is kept: {how_on}")
         sys.exit(ABORTED)
@@ -154,45 +157,48 @@ def stoppable(how_on: str) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _tune(question: "Question", trials: int, fresh: int, folder: Path, executor: "Executor") -> "Answer":
-    from .study import tune as tuning
+def _tune(
+    question: "Question", wanted: int, fresh: int, folder: "RunFolder", executor: "Executor", check: Check
+) -> "Answer":
+    from .study.tune import Trials
+    from .study.tune import tune as make_trials
     from .study.tuned import answer
 
-    study = tuning.open_trials(question, folder / TRIALS)
-    before = len(tuning.finished(study))
+    trials = Trials(question, folder.path / TRIALS)
+    before = f" ({len(trials.done)} of them are there already)" if trials.done else ""
     say(
-        f"tuning {question.algorithm} by {question.metric}: {trials} trials of {question.runs} runs, into {folder}"
-        + (f" ({before} of them are there already)" if before else "")
+        f"tuning {question.algorithm} by {question.metric}: {wanted} trials of {question.runs} runs, "
+        f"into {folder.path}{before}"
     )
-    with _progress(question, trials) as told:
-        tuning.tune(question, trials, study, executor, told)
-    return answer(question, study, fresh, executor, say)
+    with _progress(wanted, check) as told:
+        make_trials(trials, wanted, executor, told)
+    say(f"flying the default and the best setting on {fresh} fresh seeds")
+    return answer(trials, fresh, executor)
 
 
 @contextmanager
-def _progress(question: "Question", trials: int) -> "Iterator[Told]":
+def _progress(wanted: int, check: Check) -> "Iterator[Told]":
     """A bar on a terminal; else nothing, the command says what it begins and ends with."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from .study.tune import best_of
-
     console = Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("trials", total=trials)
+        task = bar.add_task("trials", total=wanted)
 
-        def told(done: Any) -> None:
-            number, score = best_of(question, done)
-            bar.update(task, completed=len(done), description=f"best: trial {number}, {score:.5g}")
+        def told(trials: "Trials") -> None:
+            check()
+            best = trials.best
+            bar.update(
+                task, completed=len(trials.done), description=f"best: trial {best}, {trials.score(best):.5g}"
+            )
 
         yield told
 
 
-def _write(found: "Answer", folder: Path) -> None:
-    from .record.folder import write_whole
-
-    write_whole(folder / YAML, text(found).encode())
-    write_whole(folder / ANSWER, (json.dumps(found.as_json(), indent=2, allow_nan=False) + "\n").encode())
+def _write(found: "Answer", folder: "RunFolder") -> None:
+    folder.write_text(folder.path / YAML, text(found))
+    folder.write_json(folder.path / ANSWER, found.as_json())
 
 
 def text(found: "Answer") -> str:

@@ -75,14 +75,15 @@ def cluster(address: str, say: Say = lambda text: None) -> Iterator[Executor]:
     Raises ClusterError if there is no scheduler, no worker, or one that runs other code than this.
     """
     client = _connect(address)
+    from distributed import KilledWorker
+
     try:
-        executor = _Checked(client, _agreed(client, address, say))
-        yield executor
+        yield _Checked(client, _agreed(client, address, say))
     except CancelledError:
         raise ClusterError(
             f"{address}: the scheduler went away in mid-study (start it and study again)"
         ) from None
-    except _killed_worker() as error:
+    except KilledWorker as error:
         raise ClusterError(f"{address}: a job was lost with several workers in turn: {error}") from None
     finally:
         client.close(timeout=CONNECT_S)
@@ -92,20 +93,16 @@ def _connect(address: str) -> "Client":
     if find_spec("distributed") is None:
         raise ClusterError("--cluster needs the extra: pip install 'swarmctl[cluster]'")
     from distributed import Client
+    from distributed.comm import resolve_address
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said here, in one line
     try:
+        resolve_address(address)  # a client that cannot even try would complain to the terminal
         return Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(
             f"{address}: no Dask scheduler answers there ({error or type(error).__name__}; start one: dask scheduler)"
         ) from None
-
-
-def _killed_worker() -> type[Exception]:
-    from distributed import KilledWorker
-
-    return KilledWorker
 
 
 def _agreed(client: "Client", address: str, say: Say) -> Code:
@@ -118,8 +115,7 @@ def _agreed(client: "Client", address: str, say: Say) -> Code:
         ) from None
     found = client.run(code, on_error="return")
     expected = judge(found)
-    threads = sum(client.nthreads().values())
-    say(f"cluster at {address}: {len(found)} workers, {threads} threads, {expected[CPU]}")
+    say(f"cluster at {address}: {len(found)} workers, {expected[CPU]}")
     if expected[CPU] != code()[CPU]:
         say(f"this machine is {code()[CPU]}: here the same study may differ in the last digits")
     return expected
@@ -153,6 +149,7 @@ class _Checked(Executor):
         # pure=False: a key for each job, or a job that is asked for twice would be answered from memory.
         self._inner: Executor = client.get_executor(pure=False)
         self._expected = expected
+        self.threads = sum(client.nthreads().values())
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> "Future[T]":
         """Have ``fn`` called by a worker."""

@@ -21,14 +21,16 @@ def figures_of_study(study: Study) -> list[CellFigures]:
 
 def write(study: Study, cells: Sequence[CellFigures], folder: RunFolder) -> dict[str, object]:
     """Write the study's files, figures first; returns what is in study.json.  Raises RunFolderError."""
-    from . import (
-        charts,
-    )  # brings the drawing library with it, which whoever wants figures alone need not wait for
-
     content = study_json(study, cells, str(folder.path))
     folder.write_json(folder.path / RESULT, content)
     folder.write_text(folder.mission, dump(merged(cells[0].cell)))
-    charts.draw_all(folder.path, study.plan, cells)
+    # The drawing library is loaded only now: an interruption meanwhile costs no figures.
+    from . import charts, grid_charts
+
+    if study.plan.varied:
+        grid_charts.draw_grid(folder.path, study.plan, cells)
+    else:
+        charts.draw_runs(folder.path, cells[0])
     return content
 
 

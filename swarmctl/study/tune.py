@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import optuna
 import sqlalchemy
+from optuna.study import StudyDirection
 from optuna.trial import TrialState
 
 from swarmctl.core import bind, planners
@@ -28,6 +29,7 @@ from swarmctl.mission.model import Mission
 from .errors import TuneError
 from .execute import jobs_of, run_jobs
 from .runs import LEVELS_PERCENT
+from .study import chunk_of, threads_of
 
 SEEDS_APART = 1_000_000
 TRAINING_FROM = 10**12
@@ -36,16 +38,17 @@ TRAINING_FROM = 10**12
 PARTS = 4
 """A trial's runs are flown in so many parts; after each but the last it may be given up."""
 
-JOB_RUNS = 5
 DIGITS = 4
 """Significant digits of a proposed value: what is printed is then exactly what was flown."""
 
+STARTING = 10
+"""Trials at random before Optuna learns from them, and before any is given up."""
+
 STUDY_NAME = "tune"
-FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 Setting = dict[str, float]
-Told = Callable[[list[optuna.trial.FrozenTrial]], None]
-"""Called after each trial with all that are finished."""
+Told = Callable[["Trials"], None]
+"""Called after each trial."""
 
 
 @dataclass(frozen=True)
@@ -126,82 +129,103 @@ class Question:
         }
 
 
-def setting_of(trial: optuna.trial.FrozenTrial) -> Setting:
-    """The values that a trial flew with."""
-    return {name: float(f"{value:.{DIGITS}g}") for name, value in trial.params.items()}
+class Trials:
+    """The finished trials of a question: Optuna's, and in ``file`` as an Optuna study in SQLite.
+
+    The file only ever holds whole trials.  Raises TuneError if it cannot be used, or holds another question's.
+    """
+
+    def __init__(self, question: Question, file: Path) -> None:
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
+        self.question = question
+        direction = StudyDirection.MINIMIZE if question.is_time else StudyDirection.MAXIMIZE
+        identity = question.identity()
+        try:
+            self._kept = optuna.create_study(
+                storage=_url(file), study_name=STUDY_NAME, direction=direction, load_if_exists=True
+            )
+            before = self._kept.get_trials()
+            if not before:
+                self._kept.set_user_attr("question", identity)
+            known = self._kept.user_attrs.get("question", {})
+        except (sqlalchemy.exc.SQLAlchemyError, optuna.exceptions.OptunaError) as error:
+            raise TuneError(f"{file}: cannot be used for trials (choose another --out): {error}") from None
+        differs = [key for key in identity if known.get(key) != identity[key]]
+        if differs:
+            raise TuneError(f"{file}: holds trials with another {', '.join(differs)} (choose another --out)")
+        self._study = optuna.create_study(direction=direction, pruner=optuna.pruners.MedianPruner(STARTING))
+        self._study.add_trials(before)
+
+    @property
+    def done(self) -> list[optuna.trial.FrozenTrial]:
+        """All finished trials, the default setting's first."""
+        return self._study.get_trials(deepcopy=False, states=(TrialState.COMPLETE, TrialState.PRUNED))
+
+    @property
+    def given_up(self) -> int:
+        """How many of them were not flown to the end."""
+        return sum(trial.state == TrialState.PRUNED for trial in self.done)
+
+    @property
+    def best(self) -> int:
+        """Which of the trials flown to the end is the best, the first of equals."""
+        whole = [trial.number for trial in self.done if trial.state == TrialState.COMPLETE]
+        return (min if self.question.is_time else max)(whole, key=self.score)
+
+    def score(self, number: int) -> float:
+        """What a trial came to."""
+        return float(self.done[number].value or 0.0)
+
+    def setting(self, number: int) -> Setting:
+        """What a trial flew with."""
+        return _rounded(self.done[number].params)
+
+    def propose(self) -> optuna.Trial:
+        """The next trial, from what the finished ones came to and a seed of its own."""
+        number = len(self.done)
+        if number == 0:
+            self._study.enqueue_trial(self.question.default)
+        seed = int(np.random.SeedSequence((self.question.seed, number)).generate_state(1)[0])
+        self._study.sampler = optuna.samplers.TPESampler(n_startup_trials=STARTING, seed=seed)
+        return self._study.ask(_space(self.question))
+
+    def finish(self, trial: optuna.Trial, score: float | None) -> None:
+        """Keep a trial and its score; None: it was given up."""
+        state = TrialState.PRUNED if score is None else TrialState.COMPLETE
+        self._kept.add_trial(self._study.tell(trial, score, state))
 
 
-def finished(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:
-    """The trials that came to an end, the default setting's first."""
-    return study.get_trials(deepcopy=False, states=FINISHED)
+def _url(file: Path) -> str:
+    return sqlalchemy.URL.create("sqlite", database=str(file)).render_as_string(hide_password=False)
 
 
-def best_of(question: Question, done: list[optuna.trial.FrozenTrial]) -> tuple[int, float]:
-    """Which of the finished trials, counted from 0, is the best of those that were not given up, and its score."""
-    scores = {k: trial.value or 0.0 for k, trial in enumerate(done) if trial.state == TrialState.COMPLETE}
-    best = (min if question.is_time else max)(scores, key=scores.__getitem__)
-    return best, scores[best]
-
-
-def open_trials(question: Question, file: Path) -> optuna.Study:
-    """The trials in ``file``, which is made if need be.  Raises TuneError if they are another question's."""
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    identity = question.identity()
-    try:
-        study = _open(question, file)
-        known = study.user_attrs.get("question")
-        if known is None and not study.get_trials(deepcopy=False):
-            study.set_user_attr("question", identity)
-            known = identity
-    except (sqlalchemy.exc.SQLAlchemyError, optuna.exceptions.OptunaError) as error:
-        raise TuneError(f"{file}: cannot be used for trials (choose another --out): {error}") from None
-    if known != identity:
-        differs = [key for key in identity if (known or {}).get(key) != identity[key]]
-        raise TuneError(f"{file}: holds trials with another {', '.join(differs)} (choose another --out)")
-    for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        study.tell(trial.number, state=TrialState.FAIL)  # it was interrupted
-    return study
-
-
-def _open(question: Question, file: Path) -> optuna.Study:
-    url = sqlalchemy.URL.create("sqlite", database=str(file)).render_as_string(hide_password=False)
-    return optuna.create_study(
-        storage=optuna.storages.RDBStorage(url),
-        study_name=STUDY_NAME,
-        direction="minimize" if question.is_time else "maximize",
-        pruner=optuna.pruners.MedianPruner(n_startup_trials=10),
-        load_if_exists=True,
-    )
-
-
-def tune(question: Question, trials: int, study: optuna.Study, executor: Executor, told: Told) -> None:
-    """Make trials until ``trials`` are finished in all, those from before included."""
-    space = _space(question)
-    while len(done := finished(study)) < trials:
-        if not done and not study.get_trials(deepcopy=False, states=(TrialState.WAITING,)):
-            study.enqueue_trial(question.default)
-        seed = int(np.random.SeedSequence((question.seed, len(done))).generate_state(1)[0])
-        study.sampler = optuna.samplers.TPESampler(seed=seed)
-        _fly(question, study, study.ask(space), executor)
-        told(finished(study))
+def _rounded(params: Mapping[str, float]) -> Setting:
+    return {name: float(f"{value:.{DIGITS}g}") for name, value in params.items()}
 
 
 def _space(question: Question) -> dict[str, optuna.distributions.BaseDistribution]:
     return {p.name: optuna.distributions.FloatDistribution(*p.search) for p in question.searched if p.search}
 
 
-def _fly(question: Question, study: optuna.Study, trial: optuna.Trial, executor: Executor) -> None:
-    """Fly one trial part by part, and tell the study what it came to."""
-    mission = question.with_setting(setting_of(study.trials[trial.number]))
+def tune(trials: Trials, wanted: int, executor: Executor, told: Told) -> None:
+    """Make trials until ``wanted`` are finished in all, those from before included."""
+    while len(trials.done) < wanted:
+        trial = trials.propose()
+        trials.finish(trial, _score(trials.question, trial, executor))
+        told(trials)
+
+
+def _score(question: Question, trial: optuna.Trial, executor: Executor) -> float | None:
+    """Fly a trial part by part: its score, or None if it is given up."""
+    mission = question.with_setting(_rounded(trial.params))
     values = np.zeros(0)
     for number, part in enumerate(_parts(question.training)):
         if number:
             trial.report(question.score(values), number)
             if trial.should_prune():
-                study.tell(trial, state=TrialState.PRUNED)
-                return
+                return None
         values = np.concatenate((values, fly(question, mission, part, executor)))
-    study.tell(trial, question.score(values))
+    return question.score(values)
 
 
 def _parts(seeds: range) -> list[range]:
@@ -212,5 +236,6 @@ def _parts(seeds: range) -> list[range]:
 
 def fly(question: Question, mission: Mission, seeds: range, executor: Executor) -> Floats:
     """What each of the seeds' runs came to, in their order."""
-    jobs = jobs_of(mission, question.algorithm, seeds, JOB_RUNS)
+    chunk = chunk_of(mission, len(seeds), threads_of(executor))
+    jobs = jobs_of(mission, question.algorithm, seeds, chunk)
     return question.values(np.concatenate(run_jobs(jobs, executor)))

@@ -4,22 +4,19 @@ The best of many trials owes some of its lead to luck with the training seeds.  
 pair by pair, and the setting counts as better only if it is ahead there by more than chance would have it.
 """
 
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import optuna
 import yaml
-from optuna.trial import TrialState
 
 from swarmctl.core.arrays import Floats
 from swarmctl.mission.model import Planner
 from swarmctl.mission.yaml_reader import Dumper
 
 from .statistics import Paired, compare, summarise
-from .tune import SEEDS_APART, TRAINING_FROM, Question, Setting, best_of, finished, fly, setting_of
+from .tune import SEEDS_APART, TRAINING_FROM, Question, Setting, Trials, fly
 
 FRESH_FROM = 2 * TRAINING_FROM
 SIGNIFICANT = 0.05
@@ -29,16 +26,20 @@ SIGNIFICANT = 0.05
 class Answer:
     """The best setting found and how it does on fresh seeds: ``default`` and ``best`` are values a run, (R,)."""
 
-    question: Question
-    setting: Setting
-    trials: int
-    given_up: int
-    best_trial: int
-    training_default: float
-    training_best: float
+    trials: Trials
     fresh: range
     default: Floats
     best: Floats
+
+    @property
+    def question(self) -> Question:
+        """What was sought."""
+        return self.trials.question
+
+    @property
+    def setting(self) -> Setting:
+        """The best setting."""
+        return self.trials.setting(self.trials.best)
 
     @cached_property
     def paired(self) -> Paired:
@@ -56,25 +57,25 @@ class Answer:
     @property
     def verdict(self) -> str:
         """The answer in a sentence."""
-        if self.best_trial == 0:
+        if self.trials.best == 0:
             return "no setting that was tried beats the default on the training seeds: keep the default"
         if self.is_better:
             return "the setting is better on fresh seeds too"
-        return "the setting is NOT better on fresh seeds, its lead in training was luck: keep the default"
+        return "the setting is NOT better on fresh seeds, or by no more than chance would have it: keep the default"
 
     def lines(self) -> list[str]:
         """What a person wants to know of it."""
-        question = self.question
-        counted = f"a run that never got there counts as {question.mission.duration_s:g} s"
+        question, trials = self.question, self.trials
+        counted = f"; a run that never got there counts as {question.mission.duration_s:g} s"
+        default, best = self._score(trials.score(0)), self._score(trials.score(trials.best))
         lines = [
-            f"{question.algorithm} on {question.mission.name} by {question.metric}: {self.trials} trials "
-            f"({self.given_up} given up early) of {question.runs} runs, seeds from {question.training.start}"
-            + (f"; {counted}" if question.is_time else ""),
-            f"training: default {self._score(self.training_default)}, best {self._score(self.training_best)} "
-            f"(trial {self.best_trial})",
+            f"{question.algorithm} on {question.mission.name} by {question.metric}: {len(trials.done)} trials "
+            f"({trials.given_up} given up early) of {question.runs} runs, seeds from {question.training.start}"
+            + (counted if question.is_time else ""),
+            f"training: default {default}, best {best} (trial {trials.best})",
             f"fresh: {len(self.fresh)} runs, seeds from {self.fresh.start}: default {self._told(self.default)}",
         ]
-        if self.best_trial:
+        if self.trials.best:
             lines[-1] += f", best {self._told(self.best)}"
             lines.append(self._pairs())
         return [*lines, self.verdict]
@@ -110,17 +111,17 @@ class Answer:
             "algorithm": question.algorithm,
             "metric": question.metric,
             "seed": question.seed,
-            "trials": self.trials,
-            "given_up": self.given_up,
+            "trials": len(self.trials.done),
+            "given_up": self.trials.given_up,
             "parameters": self.setting,
             "better": self.is_better,
             "verdict": self.verdict,
             "training": {
                 "runs": question.runs,
                 "first_seed": question.training.start,
-                "default": self.training_default,
-                "best": self.training_best,
-                "best_trial": self.best_trial,
+                "default": self.trials.score(0),
+                "best": self.trials.score(self.trials.best),
+                "best_trial": self.trials.best,
             },
             "fresh": {
                 "runs": len(self.fresh),
@@ -142,18 +143,11 @@ def fresh_seeds(question: Question, runs: int) -> range:
     return range(first, first + runs)
 
 
-def answer(
-    question: Question, study: optuna.Study, runs: int, executor: Executor, say: Callable[[str], None]
-) -> Answer:
+def answer(trials: Trials, runs: int, executor: Executor) -> Answer:
     """Fly the best of the finished trials, and the default, on ``runs`` fresh seeds."""
-    done = finished(study)
-    best, score = best_of(question, done)
+    question, best = trials.question, trials.best
     seeds = fresh_seeds(question, runs)
-    say(f"flying the default and the best setting on {runs} fresh seeds")
-    default_values = fly(question, question.with_setting(question.default), seeds, executor)
-    setting = setting_of(done[best])
-    values = default_values if best == 0 else fly(question, question.with_setting(setting), seeds, executor)
-    return Answer(
-        question, setting, len(done), sum(trial.state == TrialState.PRUNED for trial in done), best,
-        float(done[0].value or 0.0), score, seeds, default_values, values,
-    )  # fmt: skip
+    default = fly(question, question.with_setting(question.default), seeds, executor)
+    tuned = question.with_setting(trials.setting(best))
+    values = default if best == 0 else fly(question, tuned, seeds, executor)
+    return Answer(trials, seeds, default, values)
