@@ -16,7 +16,7 @@ Watch = Callable[[World, int], None]
 
 
 @dataclass(frozen=True)
-class Path:
+class Search:
     """One search: where everybody was, (ticks + 1, V, 2) metres, and the world as it was left."""
 
     flown: Variant
@@ -36,11 +36,11 @@ class Path:
         return np.asarray(self.world.found >= 0)
 
 
-def fly_path(flown: Variant, seed: int, seconds: int, watch: Watch = lambda world, tick: None) -> Path:
+def fly_search(flown: Variant, seed: int, seconds: int, watch: Watch = lambda world, tick: None) -> Search:
     """Fly for so long; ``watch`` sees the world at every tick, after all have decided and before they move."""
     scenario = Scenario(flown.mission(), ideal=True)
     world = scenario.world(seed, flown.algorithm)
-    return Path(flown, seed, world, step_on(world, seconds, watch))
+    return Search(flown, seed, world, step_on(world, seconds, watch))
 
 
 def step_on(world: World, seconds: float, watch: Watch = lambda world, tick: None) -> Floats:
