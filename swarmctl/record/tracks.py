@@ -246,7 +246,7 @@ def _draw_crossing(curve: Axes, level: str, time_s: float, *, late: bool) -> Non
     )
 
 
-def draw_legend(figure: Figure, shown: Map) -> None:
+def draw_legend(figure: Figure, shown: Map, rows: int = 1) -> None:
     """What the map's signs mean, below everything."""
     found = int(np.count_nonzero(shown.found))
     dot: Style = {"linestyle": "none", "marker": "o", "markersize": 6}
@@ -272,7 +272,7 @@ def draw_legend(figure: Figure, shown: Map) -> None:
     figure.legend(
         handles=handles,
         loc="outside lower center",
-        ncols=len(handles),
+        ncols=-(-len(handles) // rows),
         frameon=False,
         fontsize=9.5,
         labelcolor=INK,

@@ -70,11 +70,11 @@ def draw_environment(seed: int, file: Path) -> None:
 
 def draw_scene(scene: Scene, title: str, file: Path) -> None:
     """One map."""
-    figure = new_figure(SIDE_IN, SIDE_IN + 0.6)
+    figure = new_figure(SIDE_IN, SIDE_IN + 0.8)
     chart = figure.add_subplot()
     shown = map_of(scene.search)
     draw_map(chart, shown)
-    draw_legend(figure, shown)
+    draw_legend(figure, shown, rows=2)
     _title(chart, title, scene.search)
     settle(figure)
     draw_numbers(chart, shown)

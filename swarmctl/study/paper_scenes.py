@@ -31,6 +31,12 @@ TURN_DEG = 60.0
 TURN_S = 4
 """A vehicle turns because of radio if so long after its tracks part they lead so far apart."""
 
+AFTERWARDS_S = 60
+"""Fig. 19 goes on for so long after what it shows."""
+
+LEAST_MOWED = 5
+"""Targets that a vehicle has found before Fig. 21 shows how it gives way."""
+
 APART_S = 60
 """Before this everybody is still close to the launch."""
 
@@ -175,34 +181,43 @@ def _fco_pair(search: Search, alone: Search, moments: tuple[Moment, ...], why: s
 
 
 class Revisits:
-    """Watches FCO: how many revisits each vehicle begins."""
+    """Watches FCO: the ticks at which each vehicle begins a revisit."""
 
     def __init__(self, vehicles: int) -> None:
-        self.begun: Integers = np.zeros(vehicles, np.int64)
+        self.begun: list[list[int]] = [[] for _ in range(vehicles)]
         self._under_way: Integers = np.zeros(vehicles, np.int64)
 
     def __call__(self, world: World, tick: int) -> None:
-        """Count those that begin now."""
+        """Note those that begin now."""
         now = world.memory["revisiting"]
-        self.begun += (now != 0) & (self._under_way == 0)
+        for i in np.flatnonzero((now != 0) & (self._under_way == 0)):
+            self.begun[i].append(tick)
         self._under_way = now.copy()
+
+    def second(self) -> tuple[int, int] | None:
+        """The vehicle that is first to begin its second revisit, and when."""
+        again = {i: ticks[1] for i, ticks in enumerate(self.begun) if len(ticks) > 1}
+        first = min(again, key=lambda i: again[i], default=None)
+        return None if first is None else (first, again[first])
 
 
 def nine_scene(first: int) -> Scene:
-    """Fig. 19: nine vehicles, where one revisits at least twice."""
+    """Fig. 19: nine vehicles, until shortly after one begins its second revisit."""
     for seed in _seeds(first):
         revisits = Revisits(MANY_VEHICLES)
-        search = fly_search(many(), seed, WHOLE_S, revisits)
-        most = int(np.argmax(revisits.begun))
-        if revisits.begun[most] >= 2:
+        fly_search(many(), seed, WHOLE_S, revisits)
+        again = revisits.second()
+        if again is not None:
+            vehicle, tick = again
             said = (
-                f"FCO with nine vehicles: {revisits.begun.sum()} revisits are begun, "
-                f"{revisits.begun[most]} of them by vehicle {most + 1}."
+                f"FCO with nine vehicles: vehicle {vehicle + 1} has nothing new for 200 s and flies back to its "
+                f"last aim at {revisits.begun[vehicle][0]} s, and again at {tick} s."
             )
-            why = "the first on which a vehicle revisits at least twice"
-            return Scene(search, _words(seed, WHOLE_S, said, why))
-    said = _words(first, WHOLE_S, "FCO with nine vehicles.", NONE_OF_THEM)
-    return Scene(fly_search(many(), first, WHOLE_S), said)
+            seconds = min(tick + AFTERWARDS_S, WHOLE_S)
+            why = "the first on which a vehicle revisits twice"
+            return Scene(fly_search(many(), seed, seconds), _words(seed, seconds, said, why))
+    said = _words(first, SHOWN_S, "FCO with nine vehicles.", NONE_OF_THEM)
+    return Scene(fly_search(many(), first, SHOWN_S), said)
 
 
 class GivingWay:
@@ -220,7 +235,7 @@ class GivingWay:
                 beacons = {j: world.beacons[slot, j] for j in heard(world, tick, i)}
                 found = {j: int(b["best"]) for j, b in beacons.items() if b["on_visit"] != 0}
                 most = max(found, key=lambda j: found[j], default=None)
-                if most is not None and found[most] > own["found_here"]:
+                if most is not None and found[most] > own["found_here"] >= LEAST_MOWED:
                     self.moments.append((Moment(tick, i, most), int(own["found_here"]), found[most]))
         self._modes = world.memory["mode"].copy()
 
