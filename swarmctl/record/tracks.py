@@ -253,9 +253,7 @@ def draw_legend(figure: Figure, shown: Map, rows: int = 1) -> None:
     square: Style = {"linestyle": "none", "marker": "s", "markersize": 8, "markerfacecolor": "white"}
     handles: list[Line2D | Patch] = [
         Line2D([], [], linestyle="none", marker="^", markersize=7, color=GREY, label="launch"),
-        Line2D(
-            [], [], **square, markeredgecolor=GREY, label="end of the search" if shown.returns else "end"
-        ),
+        Line2D([], [], **square, markeredgecolor=GREY, label="end of the search" if shown.returns else "end"),
         Line2D([], [], **dot | {"markersize": 11}, color=GREY, label="vehicle's number"),
     ]
     if shown.returns:

@@ -235,9 +235,17 @@ class GivingWay:
                 beacons = {j: world.beacons[slot, j] for j in heard(world, tick, i)}
                 found = {j: int(b["best"]) for j, b in beacons.items() if b["on_visit"] != 0}
                 most = max(found, key=lambda j: found[j], default=None)
-                if most is not None and found[most] > own["found_here"] >= LEAST_MOWED:
+                shared = most is not None and _nearest_cluster(world, i) == _nearest_cluster(world, most)
+                if most is not None and shared and found[most] > own["found_here"] >= LEAST_MOWED:
                     self.moments.append((Moment(tick, i, most), int(own["found_here"]), found[most]))
         self._modes = world.memory["mode"].copy()
+
+
+def _nearest_cluster(world: World, vehicle: int) -> int:
+    """The cluster of the target nearest to a vehicle."""
+    targets, pose = world.scene.targets, world.poses[vehicle]
+    apart = np.hypot(targets["east"] - pose["east"], targets["north"] - pose["north"])
+    return int(targets["cluster"][np.argmin(apart)])
 
 
 def ace_scene(first: int) -> Scene:
