@@ -88,6 +88,18 @@ def is_earlier(evidence: Evidence, pairings: Sequence[Pairing], names: Names) ->
     return cases
 
 
+def is_earlier_at(evidence: Evidence, pairings: Sequence[Pairing], names: Names) -> list[Case]:
+    """The first is before the second in more than half of the pairs, by the interval of that share and by Wilcoxon's
+    signed-rank test (p < 0.05); each share found is a reading of its own."""
+    cases = []
+    for pairing in pairings:
+        for percent in LEVELS_PRINTED:
+            a, b = _times(evidence, pairing, percent)
+            reading = {**pairing.reading, "share found": f"{percent} %"}
+            cases.append(Case(reading, earlier(a, b), (_faced(a, b, names),), pairing.ours and percent == 85))
+    return cases
+
+
 def _times(evidence: Evidence, pairing: Pairing, percent: int) -> tuple[Floats, Floats]:
     return _paired(evidence.times(pairing.a, percent), evidence.times(pairing.b, percent))
 

@@ -178,11 +178,18 @@ def told_time(times: Floats) -> str:
 def told_mean(values: Floats, digits: int = 1, scale: float = 1.0, unit: str = "") -> str:
     """A mean and its interval."""
     summary = summarise(scale * np.asarray(values, float))
-    return f"{summary.mean:.{digits}f}{unit}{bracket(summary.ci95, digits)}"
+    if summary.mean is None:
+        return "none"
+    return f"{_number(summary.mean, digits)}{unit}{bracket(summary.ci95, digits)}"
 
 
 def bracket(interval: Interval | None, digits: int, scale: float = 1.0) -> str:
     """An interval behind its figure."""
     if interval is None:
         return ""
-    return f" [{scale * interval[0]:.{digits}f}, {scale * interval[1]:.{digits}f}]"
+    return f" [{_number(scale * interval[0], digits)}, {_number(scale * interval[1], digits)}]"
+
+
+def _number(value: float, digits: int) -> str:
+    """Rounded, and no minus before a zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"

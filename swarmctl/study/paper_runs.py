@@ -89,8 +89,8 @@ def gather(evidence: Evidence, executor: Executor, done: Done) -> None:
         batches = [(flown, range(evidence.first, evidence.first + n)) for flown, n in numbers.items()]
         kind.update(zip(numbers, fly(batches, executor, done, run), strict=True))
     for reading in readings():
-        evidence.optimum[reading] = _challenge(evidence, "final_fraction", reading, _is_optimum)
-        evidence.region[reading] = _challenge(evidence, "in_range", reading, in_region)
+        evidence.optimum[reading] = nominated(evidence, "final_fraction", reading, _is_optimum)
+        evidence.region[reading] = nominated(evidence, "in_range", reading, in_region)
     again = dict.fromkeys(
         weighted(point, *reading)
         for contest in (evidence.optimum, evidence.region)
@@ -114,7 +114,7 @@ def in_region(point: Weights) -> bool:
     return all(3 <= value <= 6 for value in point[1:])
 
 
-def _challenge(
+def nominated(
     evidence: Evidence, field: str, reading: tuple[str, float], claimed: Callable[[Weights], bool]
 ) -> tuple[Weights, Weights]:
     """The best of the points that are claimed to be best, and the best of all others."""
