@@ -113,7 +113,7 @@ def draw(evidence: Evidence, folder: Path) -> list[Shown]:
         *_scenes(folder, scenes.mdc_scenes(first), ("fig12", "fig13"), "MDC"),
         *_triangles(evidence, folder),
         _extremes(evidence, folder),
-        Shown("table2", "Table 2", "MDC against DPSO-U: targets in range, and seconds to a share found.", ()),
+        Shown("table2", "Table 2", "", ()),
         *_scenes(folder, scenes.fco_scenes(first), ("fig17", "fig18"), "FCO"),
     ]
     nine = scenes.nine_scene(first)

@@ -151,6 +151,7 @@ def draw_times(evidence: Evidence, names: Sequence[str], file: Path) -> None:
     chart.set_title(note, fontsize=10, color=GREY, loc="left", pad=8)
     chart.grid(axis="y", color=PALE, linewidth=0.6)
     chart.set_axisbelow(True)
-    chart.legend(loc="upper left", frameon=False, fontsize=10, labelcolor=INK, ncols=2)
+    plate: Style = {"facecolor": "white", "edgecolor": "none", "framealpha": 1.0}
+    chart.legend(loc="upper left", fontsize=10, labelcolor=INK, ncols=2, **plate)
     plain(chart)
     save(figure, file)

@@ -31,7 +31,7 @@ figure.single img { max-width: min(100%, 42rem); }
 table { border-collapse: collapse; font-size: .88rem; margin: .6rem 0; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .7rem .3rem 0; border-bottom: 1px solid var(--pale); }
 th { color: var(--grey); font-weight: 600; } tr.printed td { color: var(--grey); font-style: italic; }
-.figures td, .figures th { min-width: 5.5rem; }
+.figures td, .figures th { white-space: nowrap; }
 .verdict { display: inline-block; border-radius: .25rem; padding: 0 .45rem; font-weight: 600; font-size: .85rem;
   border: 1px solid; white-space: nowrap; }
 .holds { color: #00573f; background: #e3f4ee; } .only { color: #7a4a00; background: #fdf3dc; }
@@ -49,7 +49,7 @@ CLASS = {
 
 @dataclass(frozen=True)
 class Shown:
-    """A figure of the page: its number and name, the words below it, and its pictures."""
+    """A figure of the page: its name, the words below it and its pictures; without pictures, a table's place."""
 
     key: str
     title: str
@@ -136,14 +136,14 @@ def _if(judgement: Judgement) -> str:
 
 def _shown(page: Page) -> Iterable[str]:
     for figure in page.figures:
-        yield _figure(figure)
+        if figure.files:
+            yield _figure(figure)
         if figure.key in page.tables:
-            yield _table(page.tables[figure.key])
+            anchor = "" if figure.files else f' id="{figure.key}"'
+            yield f"<div{anchor}>{_table(page.tables[figure.key])}</div>"
 
 
 def _figure(figure: Shown) -> str:
-    if not figure.files:
-        return f'<h3 id="{figure.key}">{html.escape(figure.title)}</h3>\n<p>{html.escape(figure.caption)}</p>'
     pictures = "\n".join(
         f'<img src="{embedded(file)}" alt="{html.escape(figure.title)}">' for file in figure.files
     )
@@ -163,7 +163,7 @@ def _table(table: Table) -> str:
     head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.heads)
     rows = "".join(
         f"<tr{' class=printed' if number < table.printed else ''}>"
-        + "".join(f"<td>{html.escape(cell)}</td>" for cell in row)
+        + "".join(f"<td>{html.escape(cell).replace(chr(10), '<br>')}</td>" for cell in row)
         + "</tr>"
         for number, row in enumerate(table.rows)
     )

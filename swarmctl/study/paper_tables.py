@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .paper_claims import TABLE_2
+from .paper_judges import MEASURES
 from .paper_rules import bracket, told_mean, told_time
 from .paper_runs import Evidence
 from .paper_variants import LEVELS_PRINTED, compared, variant
@@ -14,7 +15,10 @@ LEVEL = 85
 
 @dataclass(frozen=True)
 class Table:
-    """A table as text, cell by cell: the first column names the row.  ``printed`` rows are the paper's own."""
+    """A table as text, cell by cell, which may have several lines; the first column names the row.
+
+    The first ``printed`` rows are the paper's own.
+    """
 
     title: str
     heads: Sequence[str]
@@ -33,9 +37,8 @@ def table_2(evidence: Evidence) -> Table:
     rows = [
         [
             name,
-            told_mean(evidence.figure(variant(name), "in_range"), 1),
-            told_mean(evidence.figure(variant(name), "in_range_when_any"), 1),
-            *(told_time(evidence.times(variant(name), percent)) for percent in LEVELS_PRINTED),
+            *(_lines(told_mean(evidence.figure(variant(name), f), 1)) for f in MEASURES.values()),
+            *(_lines(told_time(evidence.times(variant(name), percent))) for percent in LEVELS_PRINTED),
         ]
         for name in compared()
     ]
@@ -64,7 +67,7 @@ def table_of_figure_20(evidence: Evidence) -> Table:
         rows.append(
             [
                 name,
-                *(told_time(evidence.times(variant(name), percent)) for percent in LEVELS_PRINTED),
+                *(_lines(told_time(evidence.times(variant(name), percent))) for percent in LEVELS_PRINTED),
                 "never" if median is None else f"{median:.0f} s",
                 *("" if name == other else _before(evidence, name, other) for other in ("mdc", "fco")),
             ]
@@ -78,4 +81,9 @@ def table_of_figure_20(evidence: Evidence) -> Table:
 
 def _before(evidence: Evidence, name: str, other: str) -> str:
     pair = compare(evidence.times(variant(name), LEVEL), evidence.times(variant(other), LEVEL))
-    return f"{100 * pair.wins:.1f} %{bracket(pair.wins_ci95, 1, 100)}"
+    return _lines(f"{100 * pair.wins:.1f} %{bracket(pair.wins_ci95, 1, 100)}")
+
+
+def _lines(told: str) -> str:
+    """A figure, its interval and what is missing, on lines of their own."""
+    return told.replace(" [", "\n[").replace(" (", "\n(")
