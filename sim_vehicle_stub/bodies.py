@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmctl.core.geodesy import to_geodetic
 from swarmctl.core.jit import kernel
-from swarmctl.core.motion import climb_rate_towards, horizontal, vertical
+from swarmctl.core.motion import against_wind, carry_on, climb_rate_towards, stand
 from swarmctl.core.state import POSE
+from swarmctl.core.wire import tell
 
 Records = NDArray[Any]
 
@@ -90,64 +90,38 @@ def ground_velocity(
 
 
 @kernel
-def against_wind(
-    c_east: float, c_north: float, airspeed: float, wind_east: float, wind_north: float
-) -> tuple[float, float]:
-    """The velocity nearest to a commanded one for which the vehicle need not be faster through the air."""
-    a_east, a_north = c_east - wind_east, c_north - wind_north
-    size = math.sqrt(a_east * a_east + a_north * a_north)
-    if size <= airspeed:
-        return c_east, c_north
-    return wind_east + a_east * airspeed / size, wind_north + a_north * airspeed / size
-
-
-@kernel
-def move_one(body: Any, command: Any, limits: Any, wind_east: float, wind_north: float, dt: float) -> None:
+def move_one(
+    bodies: Records, k: int, command: Any, limits: Any, wind_east: float, wind_north: float, dt: float
+) -> None:
     """One vehicle, ``dt`` seconds further."""
-    c_east, c_north = ground_velocity(body, command, limits, wind_east, wind_north)
-    c_up = command["up"]
+    c_east, c_north = ground_velocity(bodies[k], command, limits, wind_east, wind_north)
+    up, c_up = bodies[k]["up"], command["up"]
     if command["lift"] == HEIGHT:
         c_up = climb_rate_towards(
-            body["up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"]
+            up, c_up, command["climb"], command["descent"], limits["climb_acceleration"]
         )
     elif command["lift"] == DESCENT:
-        c_up = landing_rate(body["up"], command["descent"], command["landing"])
-    if body["up"] <= 0.0 and c_up <= 0.0:
-        stand(body)
+        c_up = landing_rate(up, command["descent"], command["landing"])
+    if up <= 0.0 and c_up <= 0.0:
+        stand(bodies, k)
         return
-    v_east, v_north = body["v_east"], body["v_north"]
-    slower = c_east * c_east + c_north * c_north < v_east * v_east + v_north * v_north
-    change = limits["braking"] if slower else limits["acceleration"]
     fastest = limits["speed"] * limits["share"] if command["aim"] == VELOCITY else limits["speed"]
-    body["east"], body["north"], body["v_east"], body["v_north"] = horizontal(
-        body["east"], body["north"], v_east, v_north,
-        c_east, c_north, fastest, change, limits["lag"], dt,
+    carry_on(
+        bodies, k, c_east, c_north, c_up, fastest, limits["acceleration"], limits["braking"], limits["lag"],
+        command["climb"], command["descent"], limits["climb_acceleration"], dt,
     )  # fmt: skip
-    body["up"], body["v_up"] = vertical(
-        body["up"], body["v_up"], c_up, command["climb"], command["descent"], limits["climb_acceleration"], dt
-    )
-    if body["up"] <= 0.0:
-        stand(body)
 
 
 @kernel
-def stand(body: Any) -> None:
-    """On the ground, at rest."""
-    body["up"] = 0.0
-    body["v_east"] = 0.0
-    body["v_north"] = 0.0
-    body["v_up"] = 0.0
-
-
-@kernel
-def fall_one(body: Any, dt: float) -> None:
+def fall_one(bodies: Records, k: int, dt: float) -> None:
     """Without power: stand, or fall."""
+    body = bodies[k]
     body["v_up"] -= GRAVITY * dt
     body["up"] += body["v_up"] * dt
     body["east"] += body["v_east"] * dt
     body["north"] += body["v_north"] * dt
     if body["up"] <= 0.0:
-        stand(body)
+        stand(bodies, k)
 
 
 @kernel
@@ -159,9 +133,9 @@ def move(
     for k in range(bodies.shape[0]):
         for _ in range(steps):
             if commands[k]["powered"] == 1:
-                move_one(bodies[k], commands[k], limits[k], wind_east, wind_north, dt)
+                move_one(bodies, k, commands[k], limits[k], wind_east, wind_north, dt)
             else:
-                fall_one(bodies[k], dt)
+                fall_one(bodies, k, dt)
 
 
 @kernel
@@ -175,11 +149,7 @@ def read_sensors(
     """
     for k in range(bodies.shape[0]):
         body = bodies[k]
-        lat, lon = to_geodetic(body["east"], body["north"], origin_lat, origin_lon, origin_alt)
-        wire[k, 0] = round(lat * 1e7)
-        wire[k, 1] = round(lon * 1e7)
-        wire[k, 2] = round((body["up"] + origin_alt + altitude_errors[k]) * 1000.0)
-        wire[k, 3] = round(body["up"] * 1000.0)
-        wire[k, 4] = round(body["v_north"] * 100.0)
-        wire[k, 5] = round(body["v_east"] * 100.0)
-        wire[k, 6] = round(-body["v_up"] * 100.0)
+        wire[k, 0], wire[k, 1], wire[k, 2], wire[k, 3], wire[k, 4], wire[k, 5], wire[k, 6] = tell(
+            body["east"], body["north"], body["up"], body["v_east"], body["v_north"], body["v_up"],
+            origin_lat, origin_lon, origin_alt, altitude_errors[k],
+        )  # fmt: skip

@@ -6,6 +6,8 @@ One pilot writes one row of the fleet's commands and reads its row of the bodies
 import math
 from dataclasses import dataclass
 
+from swarmctl.core.motion import AIRSPEED_SHARE
+
 from . import bodies
 from .bodies import Records
 
@@ -37,7 +39,7 @@ class Limits:
     @property
     def airspeed(self) -> float:
         """m/s."""
-        return 1.25 * self.speed_mps if self.airspeed_mps is None else self.airspeed_mps
+        return AIRSPEED_SHARE * self.speed_mps if self.airspeed_mps is None else self.airspeed_mps
 
 
 class Pilot:

@@ -113,4 +113,6 @@ def print_algorithms(as_json: bool) -> None:
     for name, module in table.items():
         click.echo(f"{name}: {module.TITLE}")
         for p in module.PARAMETERS:
-            click.echo(f"    {p.name:<18}{p.default:>8g}  {p.meaning}  [{p.source}]")
+            default = p.default if p.choices else f"{p.default:g}"
+            meaning = f"{p.meaning} ({' or '.join(p.choices)})" if p.choices else p.meaning
+            click.echo(f"    {p.name:<18}{default:>8}  {meaning}  [{p.source}]")

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from swarmctl.core.calls import to_local
+from swarmctl.core.wire import height_of
 from swarmctl.mavlink.dialect import mav
 
 from .projection import reproject
@@ -98,7 +99,7 @@ class Setpoints:
             place = to_local(lat, lon, *vehicle.fleet_origin)
         height = None
         if not in_body and not mask & NO_Z and math.isfinite(z):
-            height = vehicle.local_origin[2] - z - vehicle.zero_amsl_m
+            height = height_of(z, vehicle.local_origin[2], vehicle.zero_amsl_m)
         self._steer(setpoint, place, height, v_east, v_north)
 
     def _fly_global(self, setpoint: Any) -> None:

@@ -32,8 +32,8 @@ from . import loop, planners, state
 F = TypeVar("F", bound=Callable[..., object])
 # Callees first.  Those of a period are copied into what calls them: handing on their twenty arrays costs more than
 # they do.
-IN_A_PERIOD = ("observe", "share", "deliver", "decide", "period")
-BOUND = ("prepare", *IN_A_PERIOD, "run_ideal", "run_multicopter")
+IN_A_PERIOD = ("observe", "inform", "share", "deliver", "decide", "period")
+BOUND = ("prepare", *IN_A_PERIOD, "run_ideal", "search", "run_multicopter")
 _OWN_NUMBER_BYTES = 6
 _NOT_CODE = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER")
 

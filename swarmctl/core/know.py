@@ -4,17 +4,18 @@ A vehicle's contacts are a list in the order it learned of them, so "new since t
 list, and what a neighbour has already been told is a prefix of it.  A beacon carries the list up to its length when
 sent (or a window of it, where the radio's bandwidth allows no more).
 
-Memory has an end.  ``contacts`` is a ring of a power of two: where there is more to know than fits, the oldest
-contact is forgotten for the newest.  ``has`` is the same as a set, open-addressed by serial number, and ``told`` a
-table of how much of whose list was heard, by number of vehicle: one that is pushed out of it is merely listened to
-anew.  So what a vehicle knows takes the same room whatever the numbers of targets and vehicles; a scenario of a few
-thousand targets and 64 vehicles forgets nothing.
+Memory has an end.  ``contacts`` is a ring of a power of two.  Once it is full, what others tell is not taken in any
+more (two who know different things would for ever make one another forget them), and for what a vehicle sees itself
+it forgets the oldest.  ``has`` is the same as a set, open-addressed by serial number, and ``told`` a table of how much
+of whose list was heard, by number of vehicle: one that is pushed out of it is merely listened to anew.  So what
+vehicles know takes no room that grows with vehicles × targets; up to 20 vehicles forget nothing of 100,000 targets.
 """
 
 from .arrays import Integers, Records
 from .jit import kernel
 
-MOST_CONTACTS = 4096  # what a vehicle remembers
+MOST_CONTACTS = 1 << 21  # what all vehicles together remember, in equal shares
+LEAST_CONTACTS = 1024  # what a vehicle remembers, however many there are
 MOST_PEERS = 64  # of whose lists it remembers how much it heard
 _OWNER = 1 << 40  # told: (number of vehicle + 1) * _OWNER + how much of its list was heard
 
@@ -131,6 +132,8 @@ def learn_told(
             first, knowledge[j].known - contacts.shape[1]
         )  # what the sender itself has forgotten since
         for c in range(first, last):
+            if knowledge[i].known >= contacts.shape[1]:
+                break
             row = c & (contacts.shape[1] - 1)
             _learn(
                 knowledge,

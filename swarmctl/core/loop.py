@@ -3,7 +3,7 @@
 Written once, bound to each planner by core/bind.py, which supplies the free names ``start``, ``tell``, ``plan`` and
 ``LISTS`` (whether beacons carry contacts).  A flight calls the four stages one by one, so that its recorder sees
 what passes between them and a replay can put recorded reports and deliveries in their place; a study calls
-``period`` and ``run_ideal``.
+``period`` and ``run_ideal``, or ``run_multicopter``.
 Arrays have one row a vehicle:
 
     fleet VEHICLE, poses POSE, knowledge KNOWLEDGE, memory the planner's MEMORY, wishes WISH
@@ -16,7 +16,7 @@ Arrays have one row a vehicle:
 import math
 from typing import TYPE_CHECKING
 
-from . import homing, know, radio, sense, stages, steering
+from . import homing, know, radio, sense, stages, steering, wire
 from .arrays import Floats, Integers, Records
 from .jit import kernel
 
@@ -47,15 +47,23 @@ def observe(
         )
 
 
+def inform(
+    memory: Records, i: int, fleet: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, reports: Records, count: int, beacons: Records, slot: int,
+) -> None:  # fmt: skip
+    """Know, first half, of one vehicle: learn the ``count`` reports of the own sensor, and make the beacon."""
+    know.learn_seen(knowledge, i, contacts, has, reports, count)
+    know.announce(beacons, slot, i, fleet, poses, knowledge, LISTS)
+    tell(memory, i, beacons, slot)
+
+
 def share(
     memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
     reports: Records, report_count: Integers, beacons: Records, slot: int,
 ) -> None:  # fmt: skip
     """Know, first half: learn what the own sensor reported, and make the beacon."""
     for i in range(poses.shape[0]):
-        know.learn_seen(knowledge, i, contacts, has, reports, report_count[i])
-        know.announce(beacons, slot, i, fleet, poses, knowledge, LISTS)
-        tell(memory, i, beacons, slot)
+        inform(memory, i, fleet, poses, knowledge, contacts, has, reports, report_count[i], beacons, slot)
 
 
 def deliver(
@@ -93,12 +101,18 @@ def period(
     report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
     edges: Floats, rules: Records, settings: Records, tick: int, wishes: Records,
 ) -> float:  # fmt: skip
-    """All four stages of one period; returns what ``deliver`` does."""
+    """All four stages of one period; returns what ``deliver`` does.
+
+    Each vehicle senses and informs at one go, while its memory is at hand; none sees what another did meanwhile.
+    """
     depth = beacons.shape[0]
     slot = tick % depth
     arriving = (tick + depth - rules[0].radio_delay) % depth
-    observe(fleet, poses, targets, grid, starts, alarms, rules, tick, reports, report_count, found)
-    share(memory, fleet, poses, knowledge, contacts, has, reports, report_count, beacons, slot)
+    for i in range(poses.shape[0]):
+        report_count[i] = sense.sense(
+            fleet, i, poses, targets, grid, starts, alarms, rules, tick, reports, found
+        )
+        inform(memory, i, fleet, poses, knowledge, contacts, has, reports, report_count[i], beacons, slot)
     nearest = deliver(fleet, poses, rules, tick, slot, heard, heard_count)
     decide(
         memory, fleet, poses, knowledge, contacts, has, told, beacons, heard, heard_count, arriving, edges,
@@ -142,43 +156,67 @@ def run_ideal(
     return math.sqrt(nearest)
 
 
-def run_multicopter(
-    memory: Records, fleet: Records, poses: Records, knowledge: Records, contacts: Records, has: Integers,
-    told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers, reports: Records,
-    report_count: Integers, found: Integers, beacons: Records, heard: Integers, heard_count: Integers,
-    edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records, settings: Records,
-    wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats, setpoints: Records,
-    orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
+def search(
+    memory: Records, fleet: Records, truth: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers,
+    reports: Records, report_count: Integers, found: Integers, beacons: Records, heard: Integers,
+    heard_count: Integers, edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records,
+    settings: Records, wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats,
+    setpoints: Records, orders: Integers, in_range: Integers, account: Floats, begun: int, first: int, end: int,
 ) -> int:  # fmt: skip
-    """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
+    """Setpoint ticks ``first`` to ``end`` - 1 of a search that began at tick ``begun``, and of the return after it.
 
-    Returns the number of setpoint ticks; ``most_ticks`` means that not everybody landed.
+    Returns the tick at which everybody had landed, or ``end``.
     """
-    prepare(memory, fleet, rules, edges)
     per_period = round(rules[0].period / rules[0].interval)
-    begun = -1
-    for i in range(errands.shape[0]):
-        errands[i].stage = stages.TAKE_OFF
-    for k in range(most_ticks):
-        if begun < 0 and steering.release(errands):
-            begun = k
-        ahead = k - begun
-        if begun >= 0 and ahead % per_period == 0 and ahead // per_period < in_range.shape[0]:
+    for k in range(first, end):
+        ahead, now = k - begun, k * rules[0].interval
+        if ahead % per_period == 0 and ahead // per_period < in_range.shape[0]:
             tick = ahead // per_period
             period(
                 memory, fleet, poses, knowledge, contacts, has, told, targets, grid, starts, alarms, reports,
                 report_count, found, beacons, heard, heard_count, edges, rules, settings, tick, wishes,
             )  # fmt: skip
             count_in_range(knowledge, tick, in_range)
-        if begun >= 0 and ahead == in_range.shape[0] * per_period:
+        if ahead == in_range.shape[0] * per_period:
             orders[:] = 1
-            homing.order_home(fleet, poses, errands, orders, k * rules[0].interval, rules, edges, guard_edges)
-        steering.steer(
-            fleet, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, paths, wants,
-            sent, setpoints,
+            homing.order_home(fleet, poses, errands, orders, now, rules, edges, guard_edges)
+        steering.go_on(
+            fleet, truth, poses, errands, wishes, now, rules, edges, guard_edges, raw_edges, paths, wants, sent,
+            setpoints, account,
         )  # fmt: skip
-        steering.move(fleet, poses, errands, sent, setpoints, rules)
-        steering.watch(poses, errands, raw_edges, account)
         if steering.all_landed(errands):
             return k
+    return end
+
+
+def run_multicopter(
+    memory: Records, fleet: Records, truth: Records, poses: Records, knowledge: Records, contacts: Records,
+    has: Integers, told: Integers, targets: Records, grid: Records, starts: Integers, alarms: Integers,
+    reports: Records, report_count: Integers, found: Integers, beacons: Records, heard: Integers,
+    heard_count: Integers, edges: Floats, guard_edges: Floats, raw_edges: Floats, rules: Records,
+    settings: Records, wishes: Records, errands: Records, paths: Records, wants: Records, sent: Floats,
+    setpoints: Records, orders: Integers, in_range: Integers, account: Floats, most_ticks: int,
+) -> int:  # fmt: skip
+    """A whole mission as a multicopter flies it, from take-off to landing, guarded at every setpoint tick.
+
+    Stages read ``poses``, which messages may have rounded; ``truth`` moves.  Returns the number of setpoint ticks;
+    ``most_ticks`` means that not everybody landed.
+    """
+    prepare(memory, fleet, rules, edges)
+    wire.observe(truth, poses, rules)
+    for i in range(errands.shape[0]):
+        errands[i].stage = stages.TAKE_OFF
+    for k in range(most_ticks):
+        if steering.release(errands):
+            return search(
+                memory, fleet, truth, poses, knowledge, contacts, has, told, targets, grid, starts, alarms,
+                reports, report_count, found, beacons, heard, heard_count, edges, guard_edges, raw_edges, rules,
+                settings, wishes, errands, paths, wants, sent, setpoints, orders, in_range, account, k, k,
+                most_ticks,
+            )  # fmt: skip
+        steering.go_on(
+            fleet, truth, poses, errands, wishes, k * rules[0].interval, rules, edges, guard_edges, raw_edges,
+            paths, wants, sent, setpoints, account,
+        )  # fmt: skip
     return most_ticks

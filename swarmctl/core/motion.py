@@ -7,7 +7,11 @@ Vertically it follows a climb rate within its own limits.  All in metres, second
 
 import math
 
+from .arrays import Records
 from .jit import kernel
+
+AIRSPEED_SHARE = 1.25
+"""What a vehicle can fly through the air, as a share of its speed: against the wind it flies the ground speed told."""
 
 
 @kernel
@@ -49,6 +53,47 @@ def vertical(
     c_up = min(max(c_up, -descent), climb)
     change = min(max(c_up - v_up, -acceleration * dt), acceleration * dt)
     return up + (v_up + 0.5 * change) * dt, v_up + change
+
+
+@kernel
+def against_wind(
+    c_east: float, c_north: float, airspeed: float, wind_east: float, wind_north: float
+) -> tuple[float, float]:
+    """The velocity nearest to a commanded one for which the vehicle need not be faster through the air."""
+    a_east, a_north = c_east - wind_east, c_north - wind_north
+    size = math.sqrt(a_east * a_east + a_north * a_north)
+    if size <= airspeed:
+        return c_east, c_north
+    return wind_east + a_east * airspeed / size, wind_north + a_north * airspeed / size
+
+
+@kernel
+def carry_on(
+    bodies: Records, i: int, c_east: float, c_north: float, c_up: float, speed: float, acceleration: float,
+    braking: float, lag: float, climb: float, descent: float, climb_acceleration: float, dt: float,
+) -> None:  # fmt: skip
+    """Move body ``i``, in the air, ``dt`` seconds further under a velocity and a climb-rate command.
+
+    ``braking`` bounds the change of velocity (m/s²) where it gets slower.  On the ground it stands.
+    """
+    v_east, v_north = bodies[i].v_east, bodies[i].v_north
+    slower = c_east * c_east + c_north * c_north < v_east * v_east + v_north * v_north
+    change = braking if slower else acceleration
+    bodies[i].east, bodies[i].north, bodies[i].v_east, bodies[i].v_north = horizontal(
+        bodies[i].east, bodies[i].north, v_east, v_north, c_east, c_north, speed, change, lag, dt
+    )
+    bodies[i].up, bodies[i].v_up = vertical(
+        bodies[i].up, bodies[i].v_up, c_up, climb, descent, climb_acceleration, dt
+    )
+    if bodies[i].up <= 0.0:
+        stand(bodies, i)
+
+
+@kernel
+def stand(bodies: Records, i: int) -> None:
+    """On the ground, at rest."""
+    bodies[i].up, bodies[i].v_up = 0.0, 0.0
+    bodies[i].v_east, bodies[i].v_north = 0.0, 0.0
 
 
 @kernel

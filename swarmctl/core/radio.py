@@ -16,7 +16,7 @@ from .arrays import Integers, Records
 from .jit import allocating_kernel, kernel
 from .randoms import LOSS, uniform
 
-MOST_HEARD = 1023  # beacons that a radio takes in a period: the lowest numbers
+MOST_HEARD = 255  # beacons that a radio takes in a period: the lowest numbers
 _PAIRWISE = 48  # vehicles up to which all pairs are gone through
 _LEAST_CELL_M = 100.0
 

@@ -50,10 +50,12 @@ def place_centres(
                 dx, dy = x - starts[s, 0], y - starts[s, 1]
                 if dx * dx + dy * dy < (3.0 * radius * ease) * (3.0 * radius * ease):
                     clear = False
-            for j in range(k):
+                    break
+            for j in range(k if clear else 0):
                 dx, dy = x - centres[j, 0], y - centres[j, 1]
                 if dx * dx + dy * dy < (2.9 * radius * ease) * (2.9 * radius * ease):
                     clear = False
+                    break
             if clear:
                 centres[k, 0] = x
                 centres[k, 1] = y

@@ -29,14 +29,16 @@ VEHICLE = record(
     integers=("beacon_contacts",),
 )  # fmt: skip
 
-# What holds for the whole run.  `reach` fields are how far ahead a planner looks for the fence.
+# What holds for the whole run.  `wire`: a study sees what messages carry (core/wire.py), about the mission's
+# origin (degrees, m); `wind` (m/s) is what its multicopters fly in.
 RULES = record(
     "seed", "period", "interval", "separation", "duration", "metric", "ideal", "radio_delay",
-    "alarm_slots", "targets", "landing_speed",
-    integers=("seed", "metric", "ideal", "radio_delay", "alarm_slots", "targets"),
+    "alarm_slots", "targets", "landing_speed", "wire", "origin_lat", "origin_lon", "origin_alt", "wind_east",
+    "wind_north",
+    integers=("seed", "metric", "ideal", "radio_delay", "alarm_slots", "targets", "wire"),
 )  # fmt: skip
 
-# Where a vehicle is and how it moves: the truth in a study, telemetry in a flight.
+# Where a vehicle is and how it moves: true, or as telemetry tells.
 POSE = record("east", "north", "up", "v_east", "v_north", "v_up")
 
 # One thing reported by a sensor or a neighbour: serial number and place.

@@ -2,7 +2,7 @@
 
 import math
 
-from . import fence, guard, homing, motion, stages
+from . import fence, guard, homing, motion, stages, wire
 from .arrays import Floats, Records
 from .jit import kernel
 
@@ -51,38 +51,53 @@ def steer(
 
 
 @kernel
-def _climb(
-    fleet: Records, poses: Records, errands: Records, setpoints: Records, rules: Records, i: int
-) -> None:
-    descent = rules[0].landing_speed if errands[i].stage == stages.LAND else fleet[i].descent
+def _fly(
+    fleet: Records, truth: Records, i: int, c_east: float, c_north: float, c_up: float, descent: float,
+    rules: Records,
+) -> None:  # fmt: skip
+    """Vehicle ``i`` flies a setpoint as it arrived, for one interval; ``descent`` limits the way down to ``c_up``."""
+    if rules[0].wind_east != 0.0 or rules[0].wind_north != 0.0:
+        airspeed = motion.AIRSPEED_SHARE * fleet[i].speed
+        c_east, c_north = motion.against_wind(
+            c_east, c_north, airspeed, rules[0].wind_east, rules[0].wind_north
+        )
     agility = fleet[i].climb_acceleration
-    rate = motion.climb_rate_towards(poses[i].up, setpoints[i].up, fleet[i].climb, descent, agility)
-    up, v_up = motion.vertical(
-        poses[i].up, poses[i].v_up, rate, fleet[i].climb, fleet[i].descent, agility, rules[0].interval
-    )
-    poses[i].up, poses[i].v_up = (up, v_up) if up > 0.0 else (0.0, 0.0)
+    rate = motion.climb_rate_towards(truth[i].up, c_up, fleet[i].climb, descent, agility)
+    motion.carry_on(
+        truth, i, c_east, c_north, rate, fleet[i].speed, fleet[i].acceleration, fleet[i].braking, fleet[i].lag,
+        fleet[i].climb, fleet[i].descent, agility, rules[0].interval,
+    )  # fmt: skip
 
 
 @kernel
 def move(
-    fleet: Records, poses: Records, errands: Records, sent: Floats, setpoints: Records, rules: Records
+    fleet: Records, truth: Records, errands: Records, sent: Floats, setpoints: Records, rules: Records
 ) -> None:
     """Let every airborne vehicle of a study follow, for one interval, the setpoint that its latency lets act now."""
     for i in range(fleet.shape[0]):
         if errands[i].stage < stages.TAKE_OFF or errands[i].stage > stages.LAND:
             continue
         late = guard.under_way(fleet, i, rules[0].interval)
-        east, north, v_east, v_north = motion.horizontal(
-            poses[i].east, poses[i].north, poses[i].v_east, poses[i].v_north, sent[i, late, 0],
-            sent[i, late, 1], fleet[i].speed, fleet[i].acceleration, fleet[i].lag, rules[0].interval,
-        )  # fmt: skip
-        poses[i].east, poses[i].north = east, north
-        poses[i].v_east, poses[i].v_north = v_east, v_north
-        _climb(fleet, poses, errands, setpoints, rules, i)
-        if errands[i].stage == stages.TAKE_OFF and abs(poses[i].up - fleet[i].altitude) < 0.5:
+        c_east, c_north = wire.told_speed(sent[i, late, 0], rules), wire.told_speed(sent[i, late, 1], rules)
+        descent = rules[0].landing_speed if errands[i].stage == stages.LAND else fleet[i].descent
+        _fly(fleet, truth, i, c_east, c_north, wire.told_height(setpoints[i].up, rules), descent, rules)
+        if errands[i].stage == stages.TAKE_OFF and abs(truth[i].up - fleet[i].altitude) < 0.5:
             errands[i].stage = stages.HOLD
-        elif errands[i].stage == stages.LAND and poses[i].up < 0.05:
+        elif errands[i].stage == stages.LAND and truth[i].up < 0.05:
             errands[i].stage = stages.LANDED
+
+
+@kernel
+def go_on(
+    fleet: Records, truth: Records, poses: Records, errands: Records, wishes: Records, now: float,
+    rules: Records, plan_edges: Floats, guard_edges: Floats, raw_edges: Floats, paths: Records,
+    wants: Records, sent: Floats, setpoints: Records, account: Floats,
+) -> None:  # fmt: skip
+    """One setpoint tick of a study: steer by what is seen, move what is there, and look."""
+    steer(fleet, poses, errands, wishes, now, rules, plan_edges, guard_edges, paths, wants, sent, setpoints)
+    move(fleet, truth, errands, sent, setpoints, rules)
+    watch(truth, errands, raw_edges, account)
+    wire.observe(truth, poses, rules)
 
 
 @kernel

@@ -1,6 +1,7 @@
 """All arrays of one run, and the stages as methods on them: what a flight, a study and a replay share."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -9,7 +10,7 @@ import numpy as np
 from . import bind, calls, planners, state
 from .arrays import Floats, Integers, Records
 from .guard import MOST_UNDER_WAY
-from .know import MOST_CONTACTS, MOST_PEERS
+from .know import LEAST_CONTACTS, MOST_CONTACTS, MOST_PEERS
 from .radio import MOST_HEARD
 from .sense import WANDER_REACH
 
@@ -35,10 +36,11 @@ class Fences:
 
 def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander_mps: float = 0.0,
                reach_m: float = 200.0) -> Scene:  # fmt: skip
-    """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m`` (at most 256 × 256 cells)."""
+    """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m``, not much finer than there
+    are targets."""
     places = np.ascontiguousarray(places, np.float64)
     west, south, east, north = calls.bounds(places)
-    cell = max(reach_m, max(east - west, north - south) / 255.0)
+    cell = max(reach_m, max(east - west, north - south) / max(255.0, 2.0 * math.sqrt(len(places))))
     grid = np.zeros(1, state.GRID)
     columns, rows = int((east - west) // cell) + 1, int((north - south) // cell) + 1
     block = math.ceil((reach_m + WANDER_REACH * wander_m) / cell - 1e-9)
@@ -49,12 +51,12 @@ def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander
     return Scene(targets, grid, starts)
 
 
-def make_settings(algorithm: str, parameters: dict[str, float]) -> Records:
+def make_settings(algorithm: str, parameters: Mapping[str, float | str]) -> Records:
     """One record with every parameter of ``algorithm``; those not given have their defaults."""
     known = planners.module(algorithm).PARAMETERS
     settings = np.zeros(1, state.record(*(p.name for p in known)))
     for parameter in known:
-        settings[0][parameter.name] = parameters.get(parameter.name, parameter.default)
+        settings[0][parameter.name] = parameter.number(parameters.get(parameter.name, parameter.default))
     return settings
 
 
@@ -82,14 +84,16 @@ class World:
         self.kernels: SimpleNamespace = bind.bind(algorithm)
         self.fleet, self.rules, self.settings = fleet, rules, settings
         self.scene, self.fences = scene, fences
-        remembered = power_of_two(min(self.serials, MOST_CONTACTS))
-        self.poses = np.zeros(count, state.POSE)
+        remembered = power_of_two(min(self.serials, max(MOST_CONTACTS // count, LEAST_CONTACTS)))
+        self.poses = np.zeros(count, state.POSE)  #: as they are seen
+        #: as they are: of a study; where it sees exactly, the very same array
+        self.truth = np.zeros(count, state.POSE) if rules[0]["wire"] else self.poses
         self.memory: Records = np.zeros(count, self.kernels.memory_dtype)
         self.knowledge = np.zeros(count, state.KNOWLEDGE)
         self.contacts = np.zeros((count, remembered), state.CONTACT)
         self.has: Integers = np.zeros((count, 2 * remembered), np.int64)
         self.told: Integers = np.zeros((count, power_of_two(min(count, MOST_PEERS))), np.int64)
-        self.reports = np.zeros((count, min(targets, MOST_CONTACTS) + 1), state.CONTACT)
+        self.reports = np.zeros((count, min(targets, max(remembered, LEAST_CONTACTS)) + 1), state.CONTACT)
         self.report_count: Integers = np.zeros(count, np.int64)
         self.alarms: Integers = np.zeros(count, np.int64)
         self.found: Integers = np.full(targets, -1, np.int64)
@@ -209,11 +213,25 @@ class World:
         rules = self.rules[0]
         account = np.array([np.inf, 0.0, 0.0, 0.0])
         most = round((most_s + rules["duration"]) / rules["interval"])
-        ticks = self.kernels.run_multicopter(
-            self.memory, self.fleet, self.poses, self.knowledge, self.contacts, self.has, self.told,
+        ticks = self.kernels.run_multicopter(*self._flown, account, most)
+        return self.in_range, account, ticks * float(rules["interval"])
+
+    def search(self, begun: int, first: int, end: int, account: Floats) -> int:
+        """Fly setpoint ticks ``first`` to ``end`` - 1 in a multicopter's dynamics, of a search begun at tick ``begun``.
+
+        Everybody is in the air already, where ``truth`` and ``poses`` say.  Returns the tick at which all had landed,
+        or ``end``.
+        """
+        ticks: int = self.kernels.search(*self._flown, account, begun, first, end)
+        return ticks
+
+    @property
+    def _flown(self) -> tuple[Records | Floats | Integers, ...]:
+        """The arrays of a flight in a multicopter's dynamics, in the kernels' order."""
+        return (
+            self.memory, self.fleet, self.truth, self.poses, self.knowledge, self.contacts, self.has, self.told,
             self.scene.targets, self.scene.grid, self.scene.starts, self.alarms, self.reports, self.report_count,
             self.found, self.beacons, self.heard, self.heard_count, self.fences.plan, self.fences.guard,
             self.fences.raw, self.rules, self.settings, self.wishes, self.errands, self.paths, self.wants,
-            self.sent, self.setpoints, self.orders, self.in_range, account, most,
+            self.sent, self.setpoints, self.orders, self.in_range,
         )  # fmt: skip
-        return self.in_range, account, ticks * float(rules["interval"])

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 from . import geometry, pads
 from .errors import Finding, KeyPath
 from .geometry import Floats
-from .model import FARTHEST_M, Mission, VehicleGroup
+from .model import WIDEST_M, Mission, VehicleGroup
 
 SHAPES = ("size_m", "polygon", "polygon_m")
 SMALLEST_M2 = {"fence": 1.0, "keep-out": 1e-6}
@@ -65,7 +65,7 @@ def _keep_outs(mission: Mission) -> Iterator[Finding]:
 def _shape(corners: Floats, path: KeyPath, what: str) -> Iterator[Finding]:
     far = float(np.abs(corners).max())
     polygon = shapely.Polygon(corners)
-    if far > 2.0 * FARTHEST_M:
+    if far > WIDEST_M:
         yield Finding(path, f"reaches {far / 1000:.0f} km from the origin", "put the origin beside the area")
     elif "Self-intersection" in (reason := shapely.is_valid_reason(polygon)):
         place = reason.partition("[")[2].rstrip("]").replace(" ", ", ")
@@ -131,15 +131,16 @@ def _whereabouts(regions: geometry.Regions, point: tuple[float, float]) -> str:
     return "nearer than safety.fence_margin_m to the fence or to a keep-out"
 
 
-def _corner(mission: Mission) -> Iterator[Finding]:
-    if mission.launch != "corner" or mission.dynamics == "ideal":
+def _placing(mission: Mission) -> Iterator[Finding]:
+    """Whether a corner launch, or a spread one, has room."""
+    if mission.launch not in ("corner", "spread") or mission.dynamics == "ideal":
         return
     path: KeyPath = ("vehicles", "launch") if isinstance(mission.vehicles, VehicleGroup) else ("vehicles",)
     try:
         pads.launch_pads(mission)
     except ValueError as error:
         hint = "lower spacing_m, move what is in the way, or name the pads: launch: [[east, north], ...]"
-        yield Finding(path, f"corner: {error}", hint)
+        yield Finding(path, f"{mission.launch}: {error}", hint)
 
 
 def _separation(mission: Mission) -> Iterator[Finding]:
@@ -240,7 +241,7 @@ CHECKS = (
     Check(_keep_outs, (("origin",), ("keep_out",))),
     Check(_launch, (*GROUND, ("vehicles", "launch"))),
     Check(_legal, GROUND),
-    Check(_corner, (*GROUND, *PADS)),
+    Check(_placing, (*GROUND, *PADS, ("safety", "separation_m"))),
     Check(_fleet, (("vehicles", "launch"), ("vehicles", "count"))),
     Check(_separation, (*PADS, ("dynamics",), ("safety", "separation_m"))),
     Check(_minimum, (("safety", "minimum_vehicles"), ("vehicles", "count"))),

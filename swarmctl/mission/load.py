@@ -126,8 +126,8 @@ def _without(data: Any, paths: Iterable[KeyPath]) -> Any:
 
 def _parameters(mission: Mission, findings: Iterable[Finding]) -> list[Finding]:
     # Here, because planners bring the compiler with them, which a mission with a fault need not wait for.
-    from swarmctl.core.planners import catalogue, limits
+    from swarmctl.core.planners import catalogue, choices, limits
 
-    found = check_parameters(mission, catalogue(), limits())
+    found = check_parameters(mission, catalogue(), limits(), choices())
     wrong = {finding.path for finding in findings}
     return [finding for finding in found if finding.path not in wrong]

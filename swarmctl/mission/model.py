@@ -14,6 +14,8 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_val
 P = TypeVar("P", bound="Part")
 
 FARTHEST_M = 100_000.0
+WIDEST_M = 250_000.0
+"""A side of a rectangle: 10,000 vehicles at the reference scenario's density want 204 km."""
 FASTEST_MPS = 30.0
 """The stub's limit; no faster multicopter is known to this program."""
 MOST_VEHICLES = 10_000
@@ -23,6 +25,7 @@ NotNegative = Annotated[float, Field(ge=0)]
 Probability = Annotated[float, Field(ge=0, le=1)]
 Metres = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Length = Annotated[float, Field(gt=0, le=FARTHEST_M)]
+Side = Annotated[float, Field(gt=0, le=WIDEST_M)]
 Latitude = Annotated[float, Field(ge=-90, le=90)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 # Not strict: YAML has lists where these want tuples.  Their items stay strict.
@@ -31,7 +34,7 @@ PointDegrees = Annotated[tuple[Latitude, Longitude], Field(strict=False)]
 PolygonM = Annotated[tuple[PointM, ...], Field(strict=False, min_length=3)]
 PolygonDegrees = Annotated[tuple[PointDegrees, ...], Field(strict=False, min_length=3)]
 PointsM = Annotated[tuple[PointM, ...], Field(strict=False)]
-Standing = Literal["corner", "as_found"]
+Standing = Literal["corner", "spread", "as_found"]
 Autopilot = Literal["auto", "px4", "ardupilot"]
 
 
@@ -60,7 +63,7 @@ class Origin(Part):
 class Area(Part):
     """The keep-in: a rectangle with its south-west corner in the origin, a polygon, or a file with one."""
 
-    size_m: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
+    size_m: Annotated[tuple[Side, Side], Field(strict=False)] | None = None
     polygon: PolygonDegrees | None = None
     polygon_m: PolygonM | None = None
     file: str | None = None
@@ -134,11 +137,11 @@ def _either(message: str) -> Discriminator:
 
 Launch = Annotated[
     Annotated[Standing, Tag("<word>")] | Annotated[PointsM, Tag("<list>")],
-    _either("must be corner, as_found, or a list of [east, north]"),
+    _either("must be corner, spread, as_found, or a list of [east, north]"),
 ]
 OneLaunch = Annotated[
     Annotated[Standing, Tag("<word>")] | Annotated[PointM, Tag("<list>")],
-    _either("must be corner, as_found, or [east, north]"),
+    _either("must be corner, spread, as_found, or [east, north]"),
 ]
 Speed = Annotated[float, Field(gt=0, le=FASTEST_MPS)]
 Altitude = Annotated[float, Field(gt=0, le=10_000)]
@@ -185,8 +188,8 @@ Vehicles = Annotated[
 class Targets(Part):
     """What is searched for: drawn in clusters, or placed (``file``: GeoJSON points; ``positions_m``)."""
 
-    clusters: Annotated[int, Field(ge=1, le=10_000)] = 6
-    count: Annotated[int, Field(ge=0, le=100_000)] = 450
+    clusters: Annotated[int, Field(ge=1, le=20_000)] = 6
+    count: Annotated[int, Field(ge=0, le=1_500_000)] = 450
     radius_m: Length = 300.0
     hot_spot_share: Probability = 0.4
     motion: Literal["static", "wander"] = "static"
@@ -276,7 +279,7 @@ class Mission(Part):
 
     @property
     def launch(self) -> Standing | tuple[tuple[float, float], ...]:
-        """``corner``, ``as_found``, or the pads, [east, north] each, one a vehicle."""
+        """``corner``, ``spread``, ``as_found``, or the pads, [east, north] each, one a vehicle."""
         if isinstance(self.vehicles, VehicleGroup):
             return self.vehicles.launch
         first = self.vehicles[0].launch

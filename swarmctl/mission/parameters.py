@@ -12,13 +12,16 @@ Known = Mapping[str, Mapping[str, float | str]]
 
 
 Limits = Mapping[str, Mapping[str, tuple[float, float]]]
+Choices = Mapping[str, Mapping[str, tuple[str, ...]]]
 
 
-def check_parameters(mission: Mission, known: Known, limits: Limits | None = None) -> list[Finding]:
+def check_parameters(
+    mission: Mission, known: Known, limits: Limits | None = None, choices: Choices | None = None
+) -> list[Finding]:
     """What is wrong with the algorithms named and their parameters.
 
     ``known`` holds each algorithm's parameters with their defaults: a parameter is text where its default is.
-    ``limits`` holds the least and the greatest value of those that are numbers.
+    ``limits`` holds the least and the greatest value of those that are numbers, ``choices`` the words of the others.
     """
     planner = mission.planner
     found = []
@@ -33,8 +36,17 @@ def check_parameters(mission: Mission, known: Known, limits: Limits | None = Non
         for name, value in given.items():
             path_to = (*path, name)
             wrong = _parameter(path_to, known[algorithm], algorithm, name, value)
-            found += wrong or _range(path_to, (limits or {}).get(algorithm, {}).get(name), value)
+            found += wrong or [
+                *_range(path_to, (limits or {}).get(algorithm, {}).get(name), value),
+                *_choice(path_to, (choices or {}).get(algorithm, {}).get(name), value),
+            ]
     return found
+
+
+def _choice(path: KeyPath, words: tuple[str, ...] | None, value: float | str) -> list[Finding]:
+    if words is None or value in words:
+        return []
+    return [Finding(path, f"must be {' or '.join(words)}, not {shown(value)}", nearest(str(value), words))]
 
 
 def _range(path: KeyPath, limits: tuple[float, float] | None, value: float | str) -> list[Finding]:

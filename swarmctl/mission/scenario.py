@@ -28,7 +28,8 @@ BEACON_BYTES, CONTACT_BYTES = 40, 16  # what a beacon and each contact in it tak
 class Scenario:
     """Everything about a mission that no seed changes.
 
-    ``ideal``: x += v dt from one point on the border, no margin, no guard; else a multicopter under guard.
+    ``ideal``: x += v dt, no margin, no guard, a corner launch being one point on the border; else a multicopter
+    under guard.
     ``stands`` (V, 2) replaces the mission's pads: where vehicles were found standing.
     """
 
@@ -41,7 +42,7 @@ class Scenario:
     @cached_property
     def starts(self) -> Floats:
         """Where each vehicle starts, (V, 2)."""
-        if self.ideal:
+        if self.ideal and self.mission.launch in ("corner", "as_found"):
             return np.tile(launch.ideal_start(self.regions), (len(self.mission.fleet), 1))
         if self._stands is not None:
             return self._stands
@@ -77,6 +78,11 @@ class Scenario:
         return fleet
 
     @cached_property
+    def _kept_clear(self) -> Floats:
+        """Where clusters keep off, (S, 2): launch points, but not those all over the area."""
+        return np.ascontiguousarray(self.starts[:1] if self.mission.launch == "spread" else self.starts)
+
+    @cached_property
     def _opening(self) -> tuple[float, float]:
         return launch.opening(self.mission, self.regions, self.starts)
 
@@ -93,6 +99,11 @@ class Scenario:
         row["radio_delay"] = math.ceil(mission.radio.delay_s / period - 1e-9)
         row["alarm_slots"] = max(_alarm_slots(v, mission.duration_s) for v in mission.fleet)
         row["landing_speed"] = LANDING_MPS
+        row["wire"] = mission.observations == "wire"
+        row["origin_lat"], row["origin_lon"], row["origin_alt"] = (
+            mission.origin.lat, mission.origin.lon, mission.origin.alt_m,
+        )  # fmt: skip
+        row["wind_east"], row["wind_north"] = mission.stub.wind_mps
         return rules
 
     def rules(self, seed: int, targets: int) -> Records:
@@ -125,13 +136,13 @@ class Scenario:
         else:
             world = again
             world.restart(fleet, rules, scene)
-        world.poses["east"], world.poses["north"] = self.starts.T
+        for poses in (world.truth, world.poses):
+            poses["east"], poses["north"] = self.starts.T
         return world
 
     def settings(self, algorithm: str) -> Records:
         """An algorithm's parameters, (1,): as the mission gives them, the others at their defaults."""
-        given = self.mission.planner.parameters.get(algorithm, {})
-        return make_settings(algorithm, {k: float(v) for k, v in given.items()})
+        return make_settings(algorithm, self.mission.planner.parameters.get(algorithm, {}))
 
     def _placed(self) -> tuple[Floats, np.ndarray[tuple[int], np.dtype[np.int64]]]:
         places = np.array(self.mission.targets.positions_m, dtype=float).reshape(-1, 2)
@@ -153,7 +164,7 @@ class Scenario:
             wanted.radius_m,
             self.regions.raw,
             box,
-            np.ascontiguousarray(self.starts),
+            self._kept_clear,
             centres,
         )
         calls.lay_out(

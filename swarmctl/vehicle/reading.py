@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+from swarmctl.core.wire import in_si
 from swarmctl.mavlink.dialect import mav
 
 from .telemetry import GeoPoint, Telemetry
@@ -20,10 +21,9 @@ def read_position(telemetry: Telemetry, fields: Any, now: float) -> None:
     telemetry.lat_e7 = fields.lat
     telemetry.lon_e7 = fields.lon
     telemetry.altitude_amsl_m = fields.alt / 1000.0
-    telemetry.height_m = fields.relative_alt / 1000.0
-    telemetry.v_north = fields.vx / 100.0
-    telemetry.v_east = fields.vy / 100.0
-    telemetry.v_up = -fields.vz / 100.0
+    telemetry.height_m, telemetry.v_east, telemetry.v_north, telemetry.v_up = in_si(
+        fields.relative_alt, fields.vx, fields.vy, fields.vz
+    )
     _date(telemetry, fields.time_boot_ms, now)
     telemetry.received_at = now
 

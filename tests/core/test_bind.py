@@ -140,5 +140,5 @@ def test_every_planner_has_what_the_registry_asks_for(name: str) -> None:
     assert all(module.MEMORY[field].itemsize % 8 == 0 for field in module.MEMORY.names)
     assert module.TITLE and module.__doc__
     assert len({p.name for p in module.PARAMETERS}) == len(module.PARAMETERS)
-    assert all(p.meaning and p.source and np.isfinite(p.default) for p in module.PARAMETERS)
+    assert all(p.meaning and p.source and np.isfinite(p.number(p.default)) for p in module.PARAMETERS)
     assert planners.catalogue()[name] == {p.name: p.default for p in module.PARAMETERS}

@@ -100,20 +100,27 @@ def test_a_full_memory_forgets_the_oldest(periods: list[list[int]]) -> None:
         assert sorted(w.has[0][w.has[0] > 0] - 1) == sorted(learned[-4:])
 
 
+def test_a_full_memory_takes_in_no_more_of_what_others_tell() -> None:
+    w = world(-1, 0)
+    w.contacts, w.has = np.zeros((FLEET, 4), w.contacts.dtype), np.zeros((FLEET, 8), np.int64)
+    for tick, (own, others) in enumerate((([0, 1], [2, 3, 4]), ([], []), ([5], [6, 7]))):
+        let_see(w, 0, own)
+        let_see(w, 1, others)
+        w.share(tick)
+        let_hear(w, 0, 0, [1])
+        w.decide(tick)
+        assert sorted(w.contacts_of(0)["id"]) == ([0, 1, 2, 3], [0, 1, 2, 3], [1, 2, 3, 5])[tick]
+
+
 def test_what_a_sender_has_forgotten_is_not_told() -> None:
     w = world(-1, 0)
     w.contacts, w.has = np.zeros((FLEET, 4), w.contacts.dtype), np.zeros((FLEET, 8), np.int64)
-    let_see(w, 1, [0, 1, 2])
-    w.share(0)
-    let_hear(w, 0, 0, [1])
-    w.decide(0)
-    assert sorted(w.contacts_of(0)["id"]) == [0, 1, 2]
-    let_see(w, 1, [3, 4, 5, 6])
-    w.share(1)
-    let_hear(w, 0, 0, [1])
-    w.decide(1)
-    assert sorted(w.contacts_of(0)["id"]) == [3, 4, 5, 6]
-    assert w.knowledge["known"][0] == 7
+    for tick, serials in enumerate(([0, 1, 2], [3, 4])):
+        let_see(w, 1, serials)
+        w.share(tick)
+        let_hear(w, 0, 0, [1] if tick else [])
+        w.decide(tick)
+    assert sorted(w.contacts_of(0)["id"]) == [1, 2, 3, 4]
 
 
 def learns_as_the_models_do(w: World, periods: list[tuple[list[int], ...]], limit: int, delay: int) -> None:

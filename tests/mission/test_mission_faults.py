@@ -60,9 +60,12 @@ Complaints = Callable[..., list[str]]
         ),
         (
             "vehicles: {launch: here}",
-            "m.yaml:1:12: vehicles.launch: must be 'corner' or 'as_found', not 'here'",
+            "m.yaml:1:12: vehicles.launch: must be 'corner', 'spread' or 'as_found', not 'here'",
         ),
-        ("vehicles: {launch: 5}", "m.yaml:1:12: vehicles.launch: must be corner, as_found, or a list of"),
+        (
+            "vehicles: {launch: 5}",
+            "m.yaml:1:12: vehicles.launch: must be corner, spread, as_found, or a list of",
+        ),
         (
             "vehicles: [{connect: 'tcp:/x'}]",
             "m.yaml:1:13: vehicles[0].connect: is not of the right form, not 'tcp:/x' (as udpin",

@@ -9,9 +9,11 @@ import shapely
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from swarmctl.mission import geometry, pads
 from swarmctl.mission.dump import dump
+from swarmctl.mission.errors import MissionError
 from swarmctl.mission.geometry import Floats, regions
 from swarmctl.mission.load import load, packaged
 from swarmctl.mission.model import Area, Circle, KeepOut, Mission, Safety
@@ -183,3 +185,29 @@ def test_every_form_is_dumped_and_loads_back_equal(read: Read) -> None:
 def test_any_name_and_number_survives(read: Read, name: str, duration: float) -> None:
     mission = Mission(name=name, duration_s=duration)
     assert read(dump(mission)) == mission
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 7, 100, 1000])
+@pytest.mark.parametrize("mission", ["paper", "lake"])
+def test_spread_vehicles_stand_evenly_all_over_the_legal_area(mission: str, count: int) -> None:
+    loaded = load(mission, {"vehicles.count": count, "vehicles.launch": "spread"})
+    regions = geometry.regions(loaded)
+    places = pads.spread_pads(regions, count, 1.0)
+    assert places.shape == (count, 2)
+    assert shapely.contains_xy(regions.legal, places).all()
+    share = math.sqrt(regions.legal.area / count)
+    if count > 6:
+        nearest = cKDTree(places).query(places, k=2)[0][:, 1]
+        assert nearest.min() > 0.5 * share
+        # Nobody in the area is far from a vehicle.
+        spots = np.random.default_rng(1).uniform(*np.array(regions.legal.bounds).reshape(2, 2), (2000, 2))
+        legal = spots[shapely.contains_xy(regions.legal, spots)]
+        assert cKDTree(places).query(legal)[0].max() < 2.5 * share
+
+
+def test_more_vehicles_than_can_stand_apart_are_refused() -> None:
+    with pytest.raises(MissionError, match=r"spread: 100 pads 15 m apart do not fit into the area"):
+        load(
+            None,
+            {"vehicles.count": 100, "vehicles.launch": "spread", "area.size_m": [150, 150], "keep_out": []},
+        )

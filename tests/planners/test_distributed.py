@@ -50,7 +50,7 @@ def in_mid_flight(algorithm: str, rng: np.random.Generator) -> Situation:
 def perturb(world: World, rng: np.random.Generator) -> None:
     """Make everything about the other vehicle different: its memory, its knowledge, what it was told."""
     for name in world.memory.dtype.names or ():
-        kind = world.memory.dtype[name].kind
+        kind = world.memory.dtype[name].base.kind
         world.memory[name][OTHER] = rng.integers(0, 4) if kind == "i" else rng.uniform(-500.0, 3000.0)
     world.memory["heading_east"][OTHER], world.memory["heading_north"][OTHER] = 0.6, -0.8
     knows = rng.permutation(len(world.scene.targets))[: rng.integers(1, 60)]

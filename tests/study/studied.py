@@ -16,7 +16,7 @@ area: {size_m: [900, 800]}
 keep_out:
   - {box_m: [300, 380, 300, 380]}
 vehicles: {count: 3, speed_mps: 18, altitude_m: 8}
-sensor: {range_m: 60}
+sensor: {range_m: 100}
 radio: {range_m: 200}
 targets: {clusters: 3, count: 40, radius_m: 60}
 duration_s: 120

@@ -40,9 +40,7 @@ def plainly() -> list[dict[str, bytes]]:
 
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(workers=st.integers(1, 5), chunk=st.integers(1, RUNS + 2))
-def test_neither_workers_nor_cutting_shows(
-    plainly: list[dict[str, bytes]], workers: int, chunk: int
-) -> None:
+def test_neither_workers_nor_cutting_shows(plainly: list[dict[str, bytes]], workers: int, chunk: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studies, "chunk_of", lambda *_: chunk)
         assert bits(flown(small_plan(ALGORITHMS, RUNS), workers)) == plainly
@@ -74,7 +72,10 @@ def test_all_runs_are_counted_and_timed() -> None:
     study, done, finished = Study(plan), [], []
     with local(2) as executor:
         study.fly(
-            executor, ticking(), done.append, lambda cell, name: finished.append((cell.settings["duration_s"], name))
+            executor,
+            ticking(),
+            done.append,
+            lambda cell, name: finished.append((cell.settings["duration_s"], name)),
         )
     assert sum(done) == plan.runs == study.finished == 40
     assert finished == [(60, "bounce"), (60, "fco"), (120, "bounce"), (120, "fco")]
@@ -153,4 +154,7 @@ def test_warming_up_tells_what_has_to_be_compiled(monkeypatch: pytest.MonkeyPatc
     Study(small_plan(ALGORITHMS, RUNS, ["duration_s=60,120"])).warm_up(told.append)
     assert asked == [("bounce", "run_ideal"), ("fco", "run_ideal")]
     assert told == ["bounce"]
-    assert flights == [("bounce", True, 1.0, (1,)), ("fco", True, 1.0, (1,))]  # a step each, whatever the settings
+    assert flights == [
+        ("bounce", True, 1.0, (1,)),
+        ("fco", True, 1.0, (1,)),
+    ]  # a step each, whatever the settings

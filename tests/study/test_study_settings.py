@@ -46,9 +46,7 @@ def test_what_cannot_be_read_is_told(texts: list[str], words: str) -> None:
 
 def test_the_grid_has_every_combination_the_last_key_fastest() -> None:
     cells = grid(read_axes(["a=1,2", "b=x,y,z", "c=0"]))
-    assert [shown(cell) for cell in cells] == [
-        f"a={a}, b={b}, c=0" for a in (1, 2) for b in ("x", "y", "z")
-    ]
+    assert [shown(cell) for cell in cells] == [f"a={a}, b={b}, c=0" for a in (1, 2) for b in ("x", "y", "z")]
 
 
 def test_without_keys_there_is_one_setting_and_it_is_empty() -> None:

@@ -14,6 +14,7 @@ MODULES = {
     "fco": "fco",
     "ace": "ace",
     "dpso-u": "dpso_u",
+    "belief": "belief",
     "bounce": "bounce",
     "levy": "levy",
     "sweep": "sweep",
@@ -26,8 +27,13 @@ def module(name: str) -> ModuleType:
 
 
 def limits() -> dict[str, dict[str, tuple[float, float]]]:
-    """Every algorithm with its parameters' least and greatest values."""
-    return {name: {p.name: (p.low, p.high) for p in module(name).PARAMETERS} for name in MODULES}
+    """Every algorithm with its parameters' least and greatest values; those that are choices have none."""
+    return {name: {p.name: (p.low, p.high) for p in module(name).PARAMETERS if not p.choices} for name in MODULES}
+
+
+def choices() -> dict[str, dict[str, tuple[str, ...]]]:
+    """Every algorithm with the words that its parameters can be, where they are no numbers."""
+    return {name: {p.name: p.choices for p in module(name).PARAMETERS if p.choices} for name in MODULES}
 
 
 def catalogue() -> dict[str, dict[str, float | str]]:

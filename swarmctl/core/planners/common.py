@@ -16,6 +16,8 @@ from ..randoms import FENCE, RULE, normal
 
 FENCE_PHI = 1.0  # magnitude of the fence response's random vector
 FENCE_TRIES = 64
+TURN_STEP = math.radians(10.0)
+TURNS = 17  # steps to either side, short of straight back
 
 
 @kernel
@@ -110,6 +112,28 @@ def blocked(memory: Records, i: int, poses: Records, edges: Floats, reach: float
     ahead_x = x + reach * memory[i].heading_east
     ahead_y = y + reach * memory[i].heading_north
     return not fence.legal(edges, x, y, ahead_x, ahead_y)
+
+
+@kernel
+def pass_by(memory: Records, i: int, poses: Records, edges: Floats, reach: float) -> None:
+    """Turn by the least angle that leaves the way ahead free; once on a ``side``, stay on it while it is not."""
+    if not blocked(memory, i, poses, edges, reach):
+        memory[i].side = 0.0
+        return
+    east, north = memory[i].heading_east, memory[i].heading_north
+    for attempt in range(2 * TURNS):
+        if memory[i].side == 0.0:
+            side = 1.0 if attempt % 2 == 0 else -1.0
+            turn = attempt // 2 + 1
+        else:
+            side = memory[i].side if attempt < TURNS else -memory[i].side
+            turn = attempt % TURNS + 1
+        c, s = math.cos(side * turn * TURN_STEP), math.sin(side * turn * TURN_STEP)
+        memory[i].heading_east = c * east - s * north
+        memory[i].heading_north = s * east + c * north
+        if not blocked(memory, i, poses, edges, reach):
+            memory[i].side = side
+            return
 
 
 @kernel

@@ -30,8 +30,6 @@ PARAMETERS = (
 )
 TRANSFER, ALONG = 0, 1
 PATIENCE = 3.0  # a leg is given up after so many times its straight flight
-TURN_STEP = math.radians(10.0)
-TURNS = 17  # steps to either side, short of straight back
 MEMORY = record(
     *COMMON_MEMORY, "west", "width", "lane", "lanes", "order", "mode", "north_end", "goal_east", "goal_north",
     "give_up_at", "side",
@@ -124,25 +122,6 @@ def _aim(memory: Records, i: int, poses: Records, carrot: float) -> None:
 
 
 @kernel
-def _pass_by(memory: Records, i: int, poses: Records, edges: Floats, reach: float) -> None:
-    """Turn by the least angle that leaves the way ahead free; once on a side, stay on it."""
-    east, north = memory[i].heading_east, memory[i].heading_north
-    for attempt in range(2 * TURNS):
-        if memory[i].side == 0.0:
-            side = 1.0 if attempt % 2 == 0 else -1.0
-            turn = attempt // 2 + 1
-        else:
-            side = memory[i].side if attempt < TURNS else -memory[i].side
-            turn = attempt % TURNS + 1
-        c, s = math.cos(side * turn * TURN_STEP), math.sin(side * turn * TURN_STEP)
-        memory[i].heading_east = c * east - s * north
-        memory[i].heading_north = s * east + c * north
-        if not common.blocked(memory, i, poses, edges, reach):
-            memory[i].side = side
-            return
-
-
-@kernel
 def step(
     memory: Records, i: int, fleet: Records, poses: Records, knowledge: Records, contacts: Records,
     beacons: Records, heard: Integers, heard_count: Integers, slot: int, edges: Floats, rules: Records,
@@ -161,10 +140,7 @@ def step(
         _next_goal(memory, i)
         _set_goal(memory, i, fleet, poses, edges, reach, now)
     _aim(memory, i, poses, 2.0 * reach)
-    if common.blocked(memory, i, poses, edges, reach):
-        _pass_by(memory, i, poses, edges, reach)
-    else:
-        memory[i].side = 0.0
+    common.pass_by(memory, i, poses, edges, reach)
     common.respond_to_fence(memory, i, poses, fleet, edges, rules, tick, settings[0].inertia)
 
 

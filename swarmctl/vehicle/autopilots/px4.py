@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from swarmctl.core.wire import down_of
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import CURRENT_MODE, mav
 from swarmctl.vehicle.commands import (
@@ -164,7 +165,7 @@ class Px4:
         home, origin = telemetry.home, telemetry.origin
         if home is None or origin is None:
             raise ValueError("a setpoint needs the home position and the local origin")
-        down = origin[2] - home[2] - height_m
+        down = down_of(height_m, origin[2], home[2])
         v_east, v_north = velocity_en
         return encoder.set_position_target_local_ned(
             telemetry.boot_ms, system, AUTOPILOT_COMPONENT, LOCAL_NED, VELOCITY_AT_ALTITUDE,
