@@ -148,16 +148,17 @@ def stopping() -> Iterator[Check]:
                 signal.signal(number, handler)
 
 
+def compiling(name: str) -> None:
+    """Say why nothing happens yet."""
+    say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
+
+
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     """Do the runs, and show how far they are."""
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
+    under_way.warm_up(compiling)
     say(_intention(plan))
     with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)

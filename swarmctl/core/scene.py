@@ -2,8 +2,7 @@
 
 Clusters are the reference scenario's: star-shaped outlines, more targets in larger clusters, part of them in
 a hot spot off the centre, none outside the area or in a keep-out.  Targets are rows sorted by grid cell; a
-row's number is the target's serial number.  A wandering target's place is a function of its number and of
-time, so it needs no state: it swings about its own point on two incommensurate periods.
+row's number is the target's serial number.  How targets move from there is in core/roam.py.
 """
 
 import math
@@ -187,18 +186,3 @@ def sort_into(grid: Records, places: Floats, clusters: Integers, targets: Record
                 first = r * grid[0].columns + max(column - grid[0].block, 0)
                 last = r * grid[0].columns + min(column + grid[0].block, grid[0].columns - 1)
                 starts[row * grid[0].columns + column, 1] += starts[last + 1, 0] - starts[first, 0]
-
-
-@kernel
-def place_at(grid: Records, targets: Records, t: int, now: float) -> tuple[float, float]:
-    """Where target ``t`` is at time ``now`` (s)."""
-    reach = grid[0].wander
-    if reach <= 0.0:
-        return targets[t].east, targets[t].north
-    rate = grid[0].wander_speed / reach
-    a = TURN * uniform(t, 0, 0, LAYOUT + 30)
-    b = TURN * uniform(t, 0, 0, LAYOUT + 31)
-    return (
-        targets[t].east + reach * math.sin(rate * now + a),
-        targets[t].north + reach * math.sin(0.618 * rate * now + b),
-    )

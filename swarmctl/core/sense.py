@@ -8,12 +8,10 @@ import math
 
 import numpy as np
 
-from . import scene
+from . import roam, scene
 from .arrays import Integers, Records
 from .jit import kernel
 from .randoms import ALARM, DETECT, NOISE, normal, uniform
-
-WANDER_REACH = 1.5  # how far off its place a wandering target can be, as a share of its swing: √2 at most
 
 
 @kernel
@@ -53,7 +51,7 @@ def _in_range(
     """
     reach = fleet[i].sensor_range
     x, y = poses[i].east, poses[i].north
-    look = reach + WANDER_REACH * grid[0].wander
+    look = reach + grid[0].stray
     here = scene.cell_of(grid, x, y)
     around = grid[0].block
     if look > around * grid[0].cell:
@@ -62,7 +60,7 @@ def _in_range(
         return 0  # empty ground, as mostly
     row, column = here // grid[0].columns, here % grid[0].columns
     west, east = max(column - around, 0), min(column + around, grid[0].columns - 1)
-    moving = grid[0].wander > 0.0
+    moving = grid[0].stray > 0.0
     room = reports.shape[1] - 1
     count = 0
     for r in range(max(row - around, 0), min(row + around, grid[0].rows - 1) + 1):
@@ -71,7 +69,7 @@ def _in_range(
         for t in range(np.uint64(first), np.uint64(last)):
             tx, ty = targets[t].east, targets[t].north
             if moving:
-                tx, ty = scene.place_at(grid, targets, t, now)
+                tx, ty = roam.place_at(grid, targets, t, now)
             if (tx - x) * (tx - x) + (ty - y) * (ty - y) <= reach * reach and count < room:
                 count = _report(reports, count, i, t, tx, ty)
     return count

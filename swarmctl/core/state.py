@@ -76,10 +76,11 @@ WANT = record("v_east", "v_north", "up")
 SETPOINT = record("v_east", "v_north", "up", "outcome", integers=("outcome",))
 
 # The stop path a vehicle owns: here, where it will be after latency and interval, where it then stands;
-# `low` and `high` bound the heights it may pass.
+# `low` and `high` bound the heights it may pass.  From `anchor_east` on: the vehicle's anchor (core/anchor.py).
 PATH = record(
     "east_0", "north_0", "east_1", "north_1", "east_2", "north_2", "low", "high", "reach", "airborne",
-    integers=("airborne",),
+    "anchor_east", "anchor_north", "freedom", "fastest", "hold", "clear", "near",
+    integers=("airborne", "near"),
 )  # fmt: skip
 
 ROUTE_POINTS = 24
@@ -90,12 +91,15 @@ ERRAND = record(
     integers=("stage", "points", "next"),
 )  # fmt: skip
 
-# One target: where it lies (or about where it wanders).
+# One target: where it lies, or about where it moves (core/roam.py), and its cluster.
 TARGET = record("east", "north", "cluster", integers=("cluster",))
 
-# The grid that the targets, sorted by cell, are found through; whoever sees no further than `block` cells sees
-# nothing where there are no targets so many cells around.
+# The grid that the targets, sorted by cell, are found through, and how they move.  Whoever sees no further than
+# `block` cells sees nothing where there are no targets so many cells around.  `stray` is how far from its place in
+# TARGET a target can be at most: 0 where nothing moves.  Where clusters drift there is one row a cluster, for its
+# way (a unit vector, and how many metres ahead and behind it goes); all else is read from the first row.
 GRID = record(
-    "east", "north", "cell", "columns", "rows", "block", "wander", "wander_speed",
-    integers=("columns", "rows", "block"),
+    "east", "north", "cell", "columns", "rows", "block", "seed", "stray", "wander", "wander_speed",
+    "drift_speed", "way_east", "way_north", "ahead", "behind",
+    integers=("columns", "rows", "block", "seed"),
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +12,7 @@ from .arrays import Floats, Integers, Records
 from .guard import MOST_UNDER_WAY
 from .know import LEAST_CONTACTS, MOST_CONTACTS, MOST_PEERS
 from .radio import MOST_HEARD
-from .sense import WANDER_REACH
+from .roam import WAYS
 
 
 @dataclass(frozen=True)
@@ -34,21 +34,51 @@ class Fences:
     guard: Floats
 
 
-def make_scene(places: Floats, clusters: Integers, wander_m: float = 0.0, wander_mps: float = 0.0,
-               reach_m: float = 200.0) -> Scene:  # fmt: skip
+@dataclass(frozen=True)
+class Motion:
+    """How targets move (core/roam.py): how far (m) each wanders to either side, and its cluster drifts along its way,
+    at most, and at which speeds (m/s).  A distance of 0 is none.  Ways end at the edges ``raw`` (E, 4)."""
+
+    seed: int = 0
+    wander_m: float = 0.0
+    wander_mps: float = 1.0
+    drift_m: float = 0.0
+    drift_mps: float = 1.0
+    raw: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+
+
+STILL = Motion()
+
+
+def make_scene(places: Floats, clusters: Integers, motion: Motion = STILL, reach_m: float = 200.0) -> Scene:
     """Sort targets at ``places`` (T, 2) into a grid for sensors of up to ``reach_m``, not much finer than there
     are targets."""
     places = np.ascontiguousarray(places, np.float64)
     west, south, east, north = calls.bounds(places)
     cell = max(reach_m, max(east - west, north - south) / max(255.0, 2.0 * math.sqrt(len(places))))
-    grid = np.zeros(1, state.GRID)
     columns, rows = int((east - west) // cell) + 1, int((north - south) // cell) + 1
-    block = math.ceil((reach_m + WANDER_REACH * wander_m) / cell - 1e-9)
-    grid[0] = (west, south, cell, columns, rows, block, wander_m, wander_mps)
+    grid = _moving(places, clusters, motion)
+    block = math.ceil((reach_m + grid[0]["stray"]) / cell - 1e-9)
+    for name, value in zip(("east", "north", "cell", "columns", "rows", "block"),
+                           (west, south, cell, columns, rows, block), strict=True):  # fmt: skip
+        grid[name] = value
     targets = np.zeros(len(places), state.TARGET)
     starts = np.zeros((columns * rows + 1, 2), np.int64)
     calls.sort_into(grid, places, clusters, targets, starts)
     return Scene(targets, grid, starts)
+
+
+def _moving(places: Floats, clusters: Integers, motion: Motion) -> Records:
+    """What GRID says of how the targets move; a single row where no cluster does."""
+    drifting = motion.drift_m > 0.0 and len(places) > 0
+    grid = np.zeros(int(clusters.max()) + 1 if drifting else 1, state.GRID)
+    grid["seed"], grid["wander"], grid["wander_speed"] = motion.seed, motion.wander_m, motion.wander_mps
+    if drifting:
+        grid["drift_speed"] = motion.drift_mps
+        room = np.zeros((len(grid), WAYS, 2))
+        calls.lay_ways(motion.seed, motion.raw, motion.drift_m, places, clusters, room, grid)
+    grid["stray"] = calls.stray(grid)
+    return grid
 
 
 def make_settings(algorithm: str, parameters: Mapping[str, float | str]) -> Records:

@@ -186,14 +186,17 @@ Vehicles = Annotated[
 
 
 class Targets(Part):
-    """What is searched for: drawn in clusters, or placed (``file``: GeoJSON points; ``positions_m``)."""
+    """What is searched for: drawn in clusters, or placed (``file``: GeoJSON points; ``positions_m``), which
+    counts as one cluster.  The speeds are the greatest of a wandering target and that of a drifting cluster."""
 
     clusters: Annotated[int, Field(ge=1, le=20_000)] = 6
     count: Annotated[int, Field(ge=0, le=1_500_000)] = 450
     radius_m: Length = 300.0
     hot_spot_share: Probability = 0.4
     motion: Literal["static", "wander"] = "static"
-    cluster_motion: Literal["static"] = "static"
+    wander_mps: Speed = 1.0
+    cluster_motion: Literal["static", "drift"] = "static"
+    cluster_mps: Speed = 1.5
     file: str | None = None
     positions_m: PointsM | None = None
 

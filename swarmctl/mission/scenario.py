@@ -11,7 +11,7 @@ import numpy as np
 
 from swarmctl.core import calls, state
 from swarmctl.core.arrays import Floats, Records
-from swarmctl.core.world import Fences, Scene, World, make_scene, make_settings
+from swarmctl.core.world import Fences, Motion, Scene, World, make_scene, make_settings
 
 from . import geometry, launch, pads
 from .model import Mission, Radio, Vehicle
@@ -21,7 +21,7 @@ DESCENT_MPS = 2.0
 CLIMB_ACCELERATION_MPS2 = 2.0
 LANDING_MPS = 0.7
 WANDER_SHARE = 0.15  # of the cluster radius: how far a wandering target swings to each side
-WANDER_MPS = 1.0
+DRIFT_SHARE = 2.0  # of the cluster radius: how far a drifting cluster goes to each side, where there is room
 BEACON_BYTES, CONTACT_BYTES = 40, 16  # what a beacon and each contact in it take on a limited radio
 
 
@@ -120,8 +120,15 @@ class Scenario:
         """What there is to find with this seed."""
         wanted = self.mission.targets
         places, clusters = self._placed() if wanted.positions_m is not None else self._drawn(seed)
-        wander = WANDER_SHARE * wanted.radius_m if wanted.motion == "wander" else 0.0
-        return make_scene(places, clusters, wander, WANDER_MPS, self._sees_furthest_m)
+        motion = Motion(
+            seed,
+            WANDER_SHARE * wanted.radius_m if wanted.motion == "wander" else 0.0,
+            wanted.wander_mps,
+            DRIFT_SHARE * wanted.radius_m if wanted.cluster_motion == "drift" else 0.0,
+            wanted.cluster_mps,
+            self.regions.raw,
+        )
+        return make_scene(places, clusters, motion, self._sees_furthest_m)
 
     def world(self, seed: int, algorithm: str | None = None, again: World | None = None) -> World:
         """All arrays of one run, vehicles standing at their start.

@@ -27,7 +27,7 @@ def build(algorithm: str, seed: int, ideal: bool, view: Callable[[Records], Reco
     """Three vehicles, forty targets, one keep-out, everything random that can be; arrays as ``view`` shows them."""
     places = np.random.default_rng(seed).normal((450.0, 500.0), 90.0, (40, 2))
     grid, starts = np.zeros(1, state.GRID), np.zeros((26, 2), np.int64)
-    grid[0] = (100.0, 100.0, 150.0, 5, 5, 1, 20.0, 1.0)
+    grid[0] = (100.0, 100.0, 150.0, 5, 5, 1, seed, 90.0, 20.0, 1.0, 2.0, 0.6, 0.8, 50.0, 60.0)
     targets = np.zeros(40, state.TARGET)
     scene.sort_into(view(grid), places, np.zeros(40, np.int64), view(targets), starts)
     fleet = fleet_of(

@@ -187,26 +187,3 @@ def test_the_grid_holds_every_target_once_in_its_own_cell(
     for c in range(len(first) - 1):
         for x, y in sorted_places[first[c] : first[c + 1]]:
             assert scene.cell_of(made.grid, x, y) == c
-
-
-def wanderer(wander: float, speed: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """The tracks (times, 2) of two wandering targets, every second for an hour."""
-    made = make_scene(np.array([[10.0, 20.0], [11.0, 21.0]]), np.zeros(2, np.int64), wander, speed)
-    targets, grid = made.targets, made.grid
-    tracks = [[scene.place_at(grid, targets, t, float(now)) for now in range(3600)] for t in (0, 1)]
-    return np.array(tracks[0]), np.array(tracks[1])
-
-
-def test_a_wandering_target_stays_about_its_place_and_moves_no_faster_than_it_may() -> None:
-    for track, home in zip(wanderer(45.0, 1.5), ([10.0, 20.0], [11.0, 21.0]), strict=True):
-        off = np.abs(track - home)
-        assert off.max() <= 45.0
-        assert off.max(axis=0) == pytest.approx(45.0, rel=0.02)  # and uses its room
-        assert np.hypot(*np.diff(track, axis=0).T).max() <= 1.5 * np.hypot(1.0, 0.618)
-
-
-def test_wandering_targets_go_their_own_ways_and_still_ones_stay() -> None:
-    one, other = wanderer(45.0)
-    assert np.hypot(*(one - other).T).max() > 30.0
-    still, _ = wanderer(0.0)
-    assert (still == [10.0, 20.0]).all()

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from swarmctl.core import scene
-from swarmctl.core.world import World, make_scene
+from swarmctl.core import roam
+from swarmctl.core.world import Motion, World, make_scene
 
 from .worlds import Place, fences, fleet_of, rules_of, world_of
 
@@ -19,14 +19,16 @@ PLACES = st.tuples(st.floats(-400, 400), st.floats(-400, 400))
 
 
 def sensing(
-    spots: list[Place], targets: list[Place], wander: float = 0.0, alarm_slots: int = 0, **values: Any
-) -> World:
-    """Vehicles at ``spots`` over still or wandering targets."""
+    spots: list[Place], targets: list[Place], wander: float = 0.0, drift: float = 0.0, alarm_slots: int = 0,
+    **values: Any,
+) -> World:  # fmt: skip
+    """Vehicles at ``spots`` over still or moving targets; those that drift are three clusters."""
     rules = rules_of(alarm_slots=alarm_slots)
     world = world_of("bounce", fleet_of(spots, **values), rules, WIDE, targets)
-    if wander:
+    if wander or drift:
         places = np.array(targets, float).reshape(-1, 2)
-        world.scene = make_scene(places, np.zeros(len(places), np.int64), wander, 2.0, reach_m=15.0)
+        motion = Motion(5, wander, 2.0, drift, 3.0, WIDE.raw)
+        world.scene = make_scene(places, np.arange(len(places)) % 3, motion, reach_m=15.0)
     return world
 
 
@@ -39,14 +41,14 @@ def reported(world: World, i: int, tick: int) -> np.ndarray:
 @settings(max_examples=200, deadline=None)
 @given(
     st.lists(PLACES, max_size=60), PLACES, st.floats(1.0, 300.0), st.sampled_from([0.0, 30.0, 200.0]),
-    st.integers(0, 5000),
+    st.sampled_from([0.0, 100.0, 700.0]), st.integers(0, 5000),
 )  # fmt: skip
 def test_reports_are_those_of_brute_force(
-    targets: list[Place], place: Place, reach: float, wander: float, tick: int
+    targets: list[Place], place: Place, reach: float, wander: float, drift: float, tick: int
 ) -> None:
-    world = sensing([place], targets, wander, sensor_range=reach)
+    world = sensing([place], targets, wander, drift, sensor_range=reach)
     rows, grid = world.scene.targets, world.scene.grid
-    where = [scene.place_at(grid, rows, t, float(tick)) for t in range(len(rows))]
+    where = [roam.place_at(grid, rows, t, float(tick)) for t in range(len(rows))]
     seen = [
         t for t, (x, y) in enumerate(where)
         if (x - place[0]) * (x - place[0]) + (y - place[1]) * (y - place[1]) <= reach * reach
@@ -57,12 +59,14 @@ def test_reports_are_those_of_brute_force(
     assert [t for t in range(len(rows)) if world.found[t] == tick] == seen
 
 
-def test_targets_that_wander_in_from_other_cells_are_seen() -> None:
-    world = sensing([(0.0, 0.0)], [(110.0, 0.0), (-90.0, -100.0), (0.0, 130.0)], 100.0, sensor_range=50.0)
+@pytest.mark.parametrize(("wander", "drift"), [(100.0, 0.0), (0.0, 300.0)])
+def test_targets_that_move_in_from_other_cells_are_seen(wander: float, drift: float) -> None:
+    spots = [(110.0, 0.0), (-90.0, -100.0), (0.0, 130.0), (100.0, -80.0), (-120.0, 0.0), (0.0, -115.0)]
+    world = sensing([(0.0, 0.0)], spots, wander, drift, sensor_range=50.0)
     rows, grid = world.scene.targets, world.scene.grid
     seen = 0
     for tick in range(0, 6000, 10):
-        where = [scene.place_at(grid, rows, t, float(tick)) for t in range(3)]
+        where = [roam.place_at(grid, rows, t, float(tick)) for t in range(6)]
         expected = [t for t, (x, y) in enumerate(where) if x * x + y * y <= 2500.0]
         assert sorted(reported(world, 0, tick)["id"].tolist()) == expected
         seen += len(expected)

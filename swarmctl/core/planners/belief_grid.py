@@ -12,7 +12,6 @@ in the 5 × 5 block about it, brought up to date cell by cell as visits and targ
 
 import math
 
-from .. import fence
 from ..arrays import Floats, Records
 from ..jit import kernel
 from . import sectors
@@ -53,13 +52,13 @@ def within(low: int, value: int, high: int) -> int:
 @kernel
 def rows_of(memory: Records, i: int) -> int:
     """How many rows the window has."""
-    return min(memory[i].rows, SIDE)
+    return int(min(memory[i].rows, SIDE))
 
 
 @kernel
 def columns_of(memory: Records, i: int) -> int:
     """How many columns the window has."""
-    return min(memory[i].columns, SIDE)
+    return int(min(memory[i].columns, SIDE))
 
 
 @kernel
@@ -130,9 +129,7 @@ def _legal_columns(memory: Records, i: int, edges: Floats, row: int) -> int:
 
 
 @kernel
-def fill_window(
-    memory: Records, i: int, edges: Floats, contacts: Records, known: int, reach: float
-) -> None:
+def fill_window(memory: Records, i: int, edges: Floats, contacts: Records, known: int, reach: float) -> None:
     """Work ``cells`` out anew from what is legal, known and visited."""
     cells = memory[i].cells
     for k in range(STRIDE * STRIDE):
@@ -144,7 +141,9 @@ def fill_window(
                 ours = sectors.own(memory, i, east_of(memory, i, column), north_of(memory, i, row))
                 cells[place(row, column)] = OWN if ours else FOREIGN
     for block in range(BLOCKS * BLOCKS):
-        inside = block // BLOCKS * BLOCK < rows_of(memory, i) and block % BLOCKS * BLOCK < columns_of(memory, i)
+        inside = block // BLOCKS * BLOCK < rows_of(memory, i) and block % BLOCKS * BLOCK < columns_of(
+            memory, i
+        )
         memory[i].ceilings[block] = 9 * memory[i].worth[PROMISING] if inside else 0
     for row in range(SIDE):
         word = memory[i].visited[row]
