@@ -72,11 +72,33 @@ def test_one_level_is_enough_to_fail() -> None:
     assert "60 of 60 never" in case.evidence[3]
 
 
+def test_each_level_may_be_a_reading_of_its_own() -> None:
+    one, other = runs_of(500 + noise(1, 20)), runs_of(550 + noise(2, 20))
+    one["time_s"][:, 0] += 200
+    cases = judges.is_earlier_at(evidence_of(one, other), [PAIRING], NAMES)
+    assert [(case.reading["share found"], case.verdict) for case in cases] == [
+        ("25 %", FAILS),
+        ("50 %", HOLDS),
+        ("75 %", HOLDS),
+        ("85 %", HOLDS),
+    ]
+    assert [case.ours for case in cases] == [False, False, False, True]
+
+
 @pytest.mark.parametrize(("spread", "verdict"), [(100.0, HOLDS), (20.0, FAILS), (50.0, OPEN)])
 def test_who_is_steadier(spread: float, verdict: Verdict) -> None:
     one, other = 500 + noise(1, 50), 500 + noise(2, spread)
     (case,) = judges.is_steadier(evidence_of(runs_of(one), runs_of(other)), [PAIRING], NAMES)
     assert case.verdict is verdict
+
+
+def test_never_as_the_end_makes_less_steady() -> None:
+    steady, torn = 500 + noise(1, 50), 500 + noise(2, 20)
+    torn[:10] = np.inf
+    evidence = evidence_of(runs_of(steady), runs_of(torn))
+    assert judges.is_steadier(evidence, [PAIRING], NAMES)[0].verdict is HOLDS
+    swapped = Pairing(PAIRING.reading, OTHER, ONE)
+    assert judges.is_steadier(evidence, [swapped], NAMES)[0].verdict is FAILS
 
 
 @pytest.mark.parametrize(("mean", "never", "verdict"), [(700, 0, HOLDS), (1100, 0, FAILS), (700, 40, FAILS)])

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from swarmctl.cli import main
+from swarmctl.study import paper
 from swarmctl.study.paper_claims import CLAIMS, TABLE_2
 from swarmctl.study.paper_rules import Verdict
 from swarmctl.study.paper_variants import compared
@@ -92,4 +93,14 @@ def test_a_folder_that_cannot_be_used_is_refused_at_once(tmp_path: Path, used: s
 def test_bad_flags(tmp_path: Path, flags: tuple[object, ...]) -> None:
     result = run(*flags, "--out", tmp_path / "out")
     assert result.exit_code == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupt_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(paper, "gather", stopped)
+    result = run("--runs", 2, "--out", tmp_path / "out")
+    assert result.exit_code == 4
     assert not (tmp_path / "out").exists()

@@ -60,6 +60,14 @@ def test_earlier_wants_more_than_a_few_pairs() -> None:
     assert earlier([100.0, 110.0, 120.0], [200.0, 210.0, 220.0]) is OPEN
 
 
+def test_earlier_wants_the_signed_ranks_to_agree() -> None:
+    """Two of three pairs are won, by next to nothing; the third is lost by far."""
+    one = np.full(60, 500.0)
+    gain, loss = np.linspace(1, 2, 40), -np.linspace(400, 500, 20)
+    assert earlier(one, one + np.concatenate((gain, loss))) is OPEN
+    assert earlier(one, one + np.concatenate((400 * gain, loss / 400))) is HOLDS
+
+
 def test_every_fails_with_one_and_is_open_with_one_that_is() -> None:
     assert every([HOLDS, HOLDS]) is HOLDS
     assert every([HOLDS, OPEN]) is OPEN
