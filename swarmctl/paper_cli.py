@@ -35,13 +35,14 @@ def paper(runs: int, seed: int, workers: int | None, out: Path | None) -> None:
         from .flight.clock import wall_s
         from .flight.fly import default_folder
         from .study import paper as whole
+        from .study.paper_runs import total
 
         folder = default_folder(out, "paper")
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, None))
         whole.warm_up(seed, _compiling)
-        say(f"flying the paper: {runs} runs an algorithm, about {whole.expected(runs)} in all")
-        with _progress(whole.expected(runs)) as done:
+        say(f"flying the paper: {runs} runs an algorithm, about {total(runs)} in all")
+        with _progress(total(runs)) as done:
             made = whole.make(folder, runs, seed, executor, wall_s, done, say)
         click.echo(f"{made.text()}\n\n{made.evidence.flown} runs, {made.wall_s:.0f} s\npage: {made.page}")
 
@@ -51,7 +52,7 @@ def _compiling(name: str) -> None:
 
 
 @contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
+def _progress(count: int) -> Iterator[Callable[[int], None]]:
     """A bar on a terminal; else nothing."""
     if not sys.stderr.isatty():
         yield lambda runs: None
@@ -60,5 +61,5 @@ def _progress(total: int) -> Iterator[Callable[[int], None]]:
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("runs", total=total)
+        task = bar.add_task("runs", total=count)
         yield lambda runs: bar.update(task, advance=runs)

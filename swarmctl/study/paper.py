@@ -21,9 +21,9 @@ from .paper_claims import CLAIMS, Claim
 from .paper_judges import SHARE
 from .paper_page import Page, Shown, render
 from .paper_rules import Judgement
-from .paper_runs import OPTIMUM, Evidence, gather, in_region, total
+from .paper_runs import OPTIMUM, Evidence, gather, in_region
 from .paper_tables import table_2, table_of_figure_20
-from .paper_variants import RANDOM, TERMS, compared, counted, triangle, variant
+from .paper_variants import RANDOM, TERMS, compared, counted, duration_s, triangle, variant
 from .runs import Job, simulate
 
 PAGE = "paper.html"
@@ -84,25 +84,20 @@ def make(
 
 def _facts(evidence: Evidence, wall_s: float) -> dict[str, str]:
     few = len(evidence.over_triangle(SHARE, TERMS[0], RANDOM[0])[OPTIMUM])
-    counted = len(next(iter(evidence.counted.values())))
+    looked_at = len(next(iter(evidence.counted.values())))
     fresh = evidence.fresh_seeds
     return {
         "command": f"swarmctl paper --runs {evidence.runs} --seed {evidence.first}",
-        "mission": "missions/paper.yaml in ideal dynamics: 6 vehicles, 450 targets in 6 clusters drawn anew for each "
-        "seed, 1600 s",
+        "mission": "missions/paper.yaml in ideal dynamics: 6 vehicles, 450 targets in 6 clusters drawn anew for "
+        f"each seed, {duration_s():g} s",
         "seeds": f"{evidence.first} to {evidence.first + evidence.runs - 1}, the same for every variant",
         "triangle": f"{len(triangle())} points x {len(TERMS)} terms x {len(RANDOM)} random vectors, {few} runs each",
         "contests": f"the claimed point and its rival again on seeds {fresh[0]} to {fresh[-1]}",
-        "clusters": f"visits, and who ends together, from {counted} runs each",
+        "clusters": f"visits, and who ends together, from {looked_at} runs each",
         "readings": "how the paper's contradictions are read stands in the planners' docstrings, "
         "swarmctl/core/planners",
         "in all": f"{evidence.flown} runs; {wall_s:.0f} s with drawing and judging",
     }
-
-
-def expected(runs: int) -> int:
-    """About how many runs there will be, for a progress bar."""
-    return total(runs)
 
 
 def draw(evidence: Evidence, folder: Path) -> list[Shown]:

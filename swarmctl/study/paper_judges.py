@@ -35,6 +35,7 @@ from .paper_variants import (
     Variant,
     Weights,
     ace,
+    duration_s,
     extreme,
     fco,
     mdc,
@@ -43,7 +44,6 @@ from .paper_variants import (
 )
 from .statistics import compare, summarise
 
-DURATION_S = 1600.0
 OURS = {"terms": "unit", "φ": "0.05"}
 WHOLE_SHARE = 0.95
 """Of the clusters visited, found whole: what "all" is judged by."""
@@ -112,7 +112,7 @@ def _paired(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 def _faced(a: Floats, b: Floats, names: Names) -> str:
     pair = compare(a, b)
-    gap = told_mean(capped(a, DURATION_S) - capped(b, DURATION_S), 0, unit=" s")
+    gap = told_mean(capped(a, duration_s()) - capped(b, duration_s()), 0, unit=" s")
     return (
         f"{names[0]} {told_time(a)}, {names[1]} {told_time(b)}; {names[0]} first in {100 * pair.wins:.1f} % of pairs"
         f"{bracket(pair.wins_ci95, 1, 100)}, p = {pair.p:.2g}; mean difference {gap}"
@@ -127,7 +127,7 @@ def is_steadier(evidence: Evidence, pairings: Sequence[Pairing], names: Names) -
         verdicts, lines = [], []
         for percent in LEVELS_PRINTED:
             a, b = _times(evidence, pairing, percent)
-            ratio = spread_ratio(capped(a, DURATION_S), capped(b, DURATION_S))
+            ratio = spread_ratio(capped(a, duration_s()), capped(b, duration_s()))
             verdicts.append(beyond(mirrored(ratio[1]), -1.0) if ratio else Verdict.OPEN)
             said = f"{ratio[0]:.2f}{bracket(ratio[1], 2)}" if ratio else "not defined"
             lines.append(
@@ -142,9 +142,9 @@ def is_below(evidence: Evidence, pairings: Sequence[Pairing], percent: int, bar_
     cases = []
     for pairing in pairings:
         times = evidence.times(pairing.a, percent)
-        whole = capped(times, DURATION_S)
+        whole = capped(times, duration_s())
         verdict = beyond(mirrored(summarise(whole).ci95), -bar_s)
-        line = f"{percent} %: {told_time(times)}; with never as {DURATION_S:.0f} s {told_mean(whole, 0, unit=' s')}"
+        line = f"{percent} %: {told_time(times)}; with never as {duration_s():.0f} s {told_mean(whole, 0, unit=' s')}"
         cases.append(Case(pairing.reading, verdict, (line,), pairing.ours))
     return cases
 

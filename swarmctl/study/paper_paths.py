@@ -36,7 +36,7 @@ class Search:
         return np.asarray(self.world.found >= 0)
 
 
-def fly_search(flown: Variant, seed: int, seconds: int, watch: Watch = lambda world, tick: None) -> Search:
+def fly_search(flown: Variant, seed: int, seconds: float, watch: Watch = lambda world, tick: None) -> Search:
     """Fly for so long; ``watch`` sees the world at every tick, after all have decided and before they move."""
     scenario = Scenario(flown.mission(), ideal=True)
     world = scenario.world(seed, flown.algorithm)

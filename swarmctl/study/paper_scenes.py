@@ -16,12 +16,12 @@ from swarmctl.core.planners import ace as ace_planner
 from swarmctl.core.world import World
 
 from .paper_paths import Search, fly_search, heard
-from .paper_variants import EXTREME, MANY_VEHICLES, Variant, ace, extreme, fco, many, mdc, silent
+from .paper_variants import EXTREME, MANY_VEHICLES, Variant, ace, duration_s, extreme, fco, many, mdc, silent
 
 SEARCHED = 200
 """Seeds that are tried; where it happens on none of them, the first is shown and the caption says so."""
 
-SHOWN_S, SHORT_S, WHOLE_S = 600, 450, 1600
+SHOWN_S, SHORT_S = 600.0, 450.0
 DRAWN_S = 5
 """A vehicle counts as drawn to another's best place after so long."""
 
@@ -205,7 +205,7 @@ def nine_scene(first: int) -> Scene:
     """Fig. 19: nine vehicles, until shortly after one begins its second revisit."""
     for seed in _seeds(first):
         revisits = Revisits(MANY_VEHICLES)
-        fly_search(many(), seed, WHOLE_S, revisits)
+        fly_search(many(), seed, duration_s(), revisits)
         again = revisits.second()
         if again is not None:
             vehicle, tick = again
@@ -213,7 +213,7 @@ def nine_scene(first: int) -> Scene:
                 f"FCO with nine vehicles: vehicle {vehicle + 1} has nothing new for 200 s and flies back to its "
                 f"last aim at {revisits.begun[vehicle][0]} s, and again at {tick} s."
             )
-            seconds = min(tick + AFTERWARDS_S, WHOLE_S)
+            seconds = min(tick + AFTERWARDS_S, duration_s())
             why = "the first on which a vehicle revisits twice"
             return Scene(fly_search(many(), seed, seconds), _words(seed, seconds, said, why))
     said = _words(first, SHOWN_S, "FCO with nine vehicles.", NONE_OF_THEM)
@@ -282,6 +282,8 @@ def extreme_scenes(first: int, numbers: Mapping[Variant, Integers]) -> list[Scen
         )
         why = f"the first of {len(numbers[flown])} on which most do"
         scenes.append(
-            Scene(fly_search(flown, first + most, WHOLE_S), _words(first + most, WHOLE_S, said, why))
+            Scene(
+                fly_search(flown, first + most, duration_s()), _words(first + most, duration_s(), said, why)
+            )
         )
     return scenes

@@ -72,6 +72,11 @@ def _base(algorithm: str, terms: str, radio_m: float | None, vehicles: int | Non
     return load(None, {key: value for key, value in given.items() if value is not None})
 
 
+def duration_s() -> float:
+    """How long a search is."""
+    return mdc().mission().duration_s
+
+
 def mdc(terms: str = "unit", random: float = 0.05) -> Variant:
     """MDC with that random vector."""
     return variant("mdc", terms, {"random": random})
