@@ -96,6 +96,10 @@ Complaints = Callable[..., list[str]]
             "planner: {parameters: {belief: {then: 3}}}",
             "m.yaml:1:33: planner.parameters.belief.then: must be text, not 3",
         ),
+        (
+            "planner: {parameters: {belief: {then: hover}}}",
+            "m.yaml:1:33: planner.parameters.belief.then: must be hold or converge, not 'hover'",
+        ),
         ("dynamics: rocket", "m.yaml:1:1: dynamics: must be 'ideal' or 'multicopter', not 'rocket'"),
         ("duration_s: !!binary aGVsbG8=", "m.yaml:1:13: duration_s: the tag"),
         ("- 1", "m.yaml:1:1: must be a mapping of keys, not [1]"),
