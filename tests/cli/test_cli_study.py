@@ -146,6 +146,7 @@ def test_the_folder_is_named_by_time(
         (("--set", "planner.personal=1"), ("'personal' is no parameter of bounce",)),
         (("--set", "planner.algorithm=fco"), ("--set planner.algorithm=fco", "--algo")),
         (("--set", "duration_s=5", "--duration", "6"), ("--set duration_s: another flag gives it too",)),
+        (("--constant-density",), ("--constant-density needs --vehicles N",)),
         (("--mission", "nowhere.yaml"), ("nowhere.yaml", "no such file")),
         (("--workers", "2", "--cluster", "tcp://127.0.0.1:1"), ("--cluster has workers of its own",)),
         (("extra",), ("unexpected extra argument",)),

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from swarmctl.mission.load import load
 from swarmctl.record import tracks
 from swarmctl.record.errors import RunFolderError
 from swarmctl.record.summary import time_to
@@ -114,7 +115,7 @@ def badges(run: Picture, monkeypatch: pytest.MonkeyPatch, path: Path) -> dict[in
     def note(chart: Axes, vehicle: int, place: Floats) -> None:
         placed[vehicle] = (chart, place)
 
-    monkeypatch.setattr(tracks, "_draw_badge", note)
+    monkeypatch.setattr(tracks, "draw_badge", note)
     draw(path, run)
     return {vehicle: chart.transData.transform(place) for vehicle, (chart, place) in placed.items()}
 
@@ -210,3 +211,12 @@ def test_title_panels_and_legend_keep_clear_of_each_other(
         assert figure.bbox.fully_contains(part.x1, part.y1)
         assert not any(part.overlaps(other) for other in parts[:number])
     assert max(part.x1 for part in parts) > 0.97 * figure.bbox.width
+
+
+def test_the_picture_says_when_targets_move() -> None:
+    still, drifting, wandering = (
+        tracks.subtitle_of(load(name), 3) for name in ("paper", "drifting", "wandering")
+    )
+    assert still == "paper, seed 3"
+    assert drifting == "drifting, seed 3; targets move, drawn where they started"
+    assert "targets move" in wandering
