@@ -122,6 +122,10 @@ def test_a_wrong_key_is_named_with_its_place(complaints: Complaints, text: str, 
             "m.yaml:1:8: area.polygon_m: the fence crosses itself at [500, 500] m",
         ),
         (
+            "dynamics: ideal\nobservations: wire",
+            "m.yaml:2:1: observations: ideal points send no messages",
+        ),
+        (
             "area: {polygon_m: [[0, 0], [500, 0], [1000, 0]]}",
             "m.yaml:1:8: area.polygon_m: the fence",
         ),
