@@ -102,4 +102,4 @@ def stray(grid: Records) -> float:
     if grid[0].drift_speed > 0.0:
         for k in range(grid.shape[0]):
             furthest = max(furthest, max(grid[k].ahead, grid[k].behind))
-    return furthest + math.sqrt(2.0) * grid[0].wander
+    return float(furthest + math.sqrt(2.0) * grid[0].wander)
