@@ -75,7 +75,7 @@ def step(world: World, k: int, account: np.ndarray) -> int:
     """One setpoint tick; returns the next one's number."""
     world.steer(k * float(world.rules[0]["interval"]))
     move(world.fleet, world.poses, world.errands, world.sent, world.setpoints, world.rules)
-    watch(world.poses, world.errands, world.fences.raw, account)
+    watch(world.poses, world.errands, world.fences.raw, world.paths, account)
     return k + 1
 
 

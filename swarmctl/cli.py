@@ -24,6 +24,7 @@ from .console import (
     say,
 )
 from .core.planners import MODULES
+from .paper_cli import paper
 from .study_cli import study
 from .tune_cli import tune
 
@@ -62,6 +63,7 @@ def main() -> None:
     """Search an area with a swarm of MAVLink vehicles, each with its own planner."""
 
 
+main.add_command(paper)
 main.add_command(study)
 main.add_command(tune)
 

@@ -63,6 +63,10 @@ class AlgorithmsType(click.ParamType):  # type: ignore[type-arg]
 @click.option("--workers", type=click.IntRange(1), help="Threads here (default: one a processor).")
 @click.option("--cluster", "address", metavar="ADDRESS", help="A Dask scheduler that does the runs instead.")
 @click.option("--vehicles", type=click.IntRange(1), help="How many vehicles.")
+@click.option(
+    "--constant-density", is_flag=True,
+    help="Area, clusters and targets grow with the vehicles, which start spread over the area.",
+)  # fmt: skip
 @click.option("--duration", type=float, help="Length of the search in seconds.")
 @click.option(
     "--set", "sets", multiple=True, metavar="KEY=V[,V...]",
@@ -72,8 +76,8 @@ class AlgorithmsType(click.ParamType):  # type: ignore[type-arg]
 @click.option("--json", "as_json", is_flag=True, help="Print study.json, and nothing else, on stdout.")
 def study(
     mission_file: Path | None, algorithms: tuple[str, ...], runs: int, seed: int, workers: int | None,
-    address: str | None, vehicles: int | None, duration: float | None, sets: tuple[str, ...], out: Path | None,
-    as_json: bool,
+    address: str | None, vehicles: int | None, constant_density: bool, duration: float | None,
+    sets: tuple[str, ...], out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Fly a mission many times over with each of several algorithms, and compare them.
 
@@ -86,11 +90,13 @@ def study(
 
         flags = {"vehicles.count": vehicles, "duration_s": duration}
         given: dict[str, object] = {key: value for key, value in flags.items() if value is not None}
-        under_way = Study(make_plan(mission_file, algorithms, range(seed, seed + runs), given, sets))
+        seeds = range(seed, seed + runs)
+        under_way = Study(make_plan(mission_file, algorithms, seeds, given, sets, constant_density))
         folder = default_folder(out, "study")
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, address))
         try:
+            _warm_up(under_way, executor, address is None)
             _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
@@ -138,8 +144,23 @@ def stopping() -> Iterator[Check]:
         say("stopped")
         sys.exit(ABORTED)
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if not asked:  # else a second one still ends what is left to do
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def compiling(name: str) -> None:
+    """Say why nothing happens yet."""
+    say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
+
+
+def _warm_up(under_way: "Study", executor: "Executor", here: bool) -> None:
+    """Have everything compiled before the clock starts."""
+    if not here:
+        say("the workers load their kernels, or compile them: a first start takes some seconds an algorithm")
+        under_way.warm_up_elsewhere(executor)
+        return
+    under_way.warm_up(compiling)
 
 
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
@@ -147,11 +168,6 @@ def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(
-        lambda name: say(
-            f"compiling the kernels of {name}: the first start takes some seconds, later ones do not"
-        )
-    )
     say(_intention(plan))
     with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)

@@ -2,30 +2,28 @@
 
 import json
 import os
-import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from .console import ABORTED, BAD_INPUT, INTERRUPTIONS, plain_errors, say
+from .console import BAD_INPUT, plain_errors, say
 from .core.planners import MODULES
-from .study_cli import executor_of
+from .study_cli import MOST_RUNS, Check, PathArgument, compiling, executor_of, stopping
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from .mission.model import Mission
     from .record.folder import RunFolder
+    from .study.plan import Plan
     from .study.tune import Question, Told, Trials
     from .study.tuned import Answer
 
 METRICS = ("t25", "t50", "t75", "t85", "t95", "final", "in_range")
-MOST_SEED, MOST_RUNS = 999_999, 1_000_000  # training and fresh seeds never meet
-Check = Callable[[], None]
+MOST_SEED = 999_999  # up to this and MOST_RUNS, training and fresh seeds never meet
 TRIALS, ANSWER, YAML = "trials.db", "tune.json", "planner.yaml"
 
 
@@ -54,13 +52,11 @@ TRIALS, ANSWER, YAML = "trials.db", "tune.json", "planner.yaml"
 )
 @click.option("--workers", type=click.IntRange(1), help="Threads here (default: one a processor).")
 @click.option("--cluster", "address", metavar="ADDRESS", help="A Dask scheduler that does the runs instead.")
-@click.option(
-    "--mission", "mission_file", type=click.Path(path_type=Path), help="Mission file (default: paper.yaml)."
-)
+@click.option("--mission", "mission_file", type=PathArgument, help="Mission file (default: paper.yaml).")
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="A mission key; may be repeated.")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PathArgument,
     help="Folder of the trials; one that has some goes on with them.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print tune.json, and nothing else, on stdout.")
@@ -72,18 +68,21 @@ def tune(
 
     Prints the planner section of a mission.  Parameters that the mission or --set gives are held.
     """
-    with plain_errors(), ExitStack() as ending:
+    with plain_errors(), stopping() as check, ExitStack() as ending:
         from .study.tune import Question
 
-        question = Question(_mission(mission_file, algorithm, settings), algorithm, metric, runs, seed)
+        plan = _plan(mission_file, algorithm, settings)
+        question = Question(plan.cells[0].missions[algorithm], algorithm, metric, runs, seed)
         folder = _folder(out, algorithm)
         ending.callback(folder.remove_if_empty)
-        with (
-            stoppable(f"go on with: --out {folder.path}") as check,
-            _alone(folder),
-            executor_of(workers, address) as executor,
-        ):
-            found = _tune(question, trials, fresh, folder, executor, check)
+        try:
+            with _alone(folder), executor_of(workers, address) as executor:
+                if address is None:
+                    _warm_up(plan)
+                found = _tune(question, trials, fresh, folder, executor, check)
+        except KeyboardInterrupt:
+            say(f"what was finished is kept: go on with --out {folder.path}")
+            raise
         _write(found, folder)
         if as_json:
             click.echo(json.dumps(found.as_json(), indent=2, allow_nan=False))
@@ -91,15 +90,21 @@ def tune(
             click.echo(text(found), nl=False)
 
 
-def _mission(mission_file: Path | None, algorithm: str, sets: Sequence[str]) -> "Mission":
-    """The mission with what --set says over it; a study's, but that no key can vary."""
+def _plan(mission_file: Path | None, algorithm: str, sets: Sequence[str]) -> "Plan":
+    """A study of the one algorithm, in which no key varies."""
     from .study.errors import StudyError
     from .study.plan import make_plan
 
     plan = make_plan(mission_file, [algorithm], range(1), {}, sets)
     if plan.varied:
         raise StudyError(f"--set {plan.varied[0].key}: tuning is for one mission (give one value)")
-    return plan.cells[0].missions[algorithm]
+    return plan
+
+
+def _warm_up(plan: "Plan") -> None:
+    from .study.study import Study
+
+    Study(plan).warm_up(compiling)
 
 
 def _folder(out: Path | None, algorithm: str) -> "RunFolder":
@@ -126,35 +131,6 @@ def _alone(folder: "RunFolder") -> Iterator[None]:
         sys.exit(BAD_INPUT)
     finally:
         os.close(lock)
-
-
-@contextmanager
-def stoppable(how_on: str) -> Iterator[Check]:
-    """Ctrl-C (SIGTERM, or a closed terminal): stop, say how to go on, and exit as aborted.
-
-    The interrupt may fall into a destructor or a callback of compiled code, which no exception leaves; so what is
-    given is to be called now and then, and stops what missed it.
-    """
-    asked: list[int] = []
-
-    def stop(number: int, frame: object) -> None:
-        asked.append(number)
-        raise KeyboardInterrupt
-
-    def check() -> None:
-        if asked:
-            raise KeyboardInterrupt
-
-    before: dict[int, Any] = {n: signal.signal(n, stop) for n in INTERRUPTIONS}
-    try:
-        yield check
-        check()
-    except KeyboardInterrupt:
-        say(f"stopped; what was finished is kept: {how_on}")
-        sys.exit(ABORTED)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _tune(

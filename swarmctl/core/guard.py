@@ -13,7 +13,7 @@ import math
 
 from . import fence, motion
 from .arrays import Floats, Records
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 
 HEIGHT_SEPARATION_M = 5.0  # vehicles nearer than this in height must be separated horizontally
 HEIGHT_MARGIN_M = 0.7  # two vehicles' height errors together
@@ -32,26 +32,28 @@ COSINES = tuple(math.cos(math.radians(a)) for a in TURNS)
 SINES = tuple(math.sin(math.radians(a)) for a in TURNS)
 
 
-@kernel
-def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
-    """Where vehicle ``i``, braking from velocity (vx, vy) at (x, y), stands still."""
+@inlined_kernel
+def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
+    """Where vehicle ``i``, braking from velocity (vx, vy) at (x, y), stands still, and how far (m) that is."""
     speed = math.sqrt(vx * vx + vy * vy)
     if speed < 1e-9:
-        return x, y
+        return x, y, 0.0
     braking = BRAKING_SHARE * fleet[i].braking
     lag = fleet[i].lag
     distance = speed * speed / (2.0 * braking) + min(speed, braking * lag) * lag
-    return x + distance * vx / speed, y + distance * vy / speed
+    return x + distance * vx / speed, y + distance * vy / speed, distance
 
 
-@kernel
+@inlined_kernel
 def under_way(fleet: Records, i: int, interval: float) -> int:
     """How many setpoints were sent and have not acted yet: the vehicle's latency in whole intervals, rounded up."""
+    if fleet[i].latency == 0.0:
+        return 0
     intervals: int = math.ceil(fleet[i].latency / interval - 1e-9)
     return min(intervals, MOST_UNDER_WAY)
 
 
-@kernel
+@inlined_kernel
 def _coast(
     fleet: Records, i: int, poses: Records, sent: Floats, cx: float, cy: float, interval: float, last: bool
 ) -> tuple[float, float, float, float]:
@@ -67,24 +69,22 @@ def _coast(
     return x, y, vx, vy
 
 
-@kernel
+@inlined_kernel
 def _write_path(
     fleet: Records, i: int, poses: Records, sent: Floats, cx: float, cy: float, interval: float, last: bool,
     paths: Records, row: int,
 ) -> None:  # fmt: skip
     """Write into ``paths[row]`` the path vehicle ``i`` owns, or will own after an interval of (cx, cy)."""
     x, y, vx, vy = _coast(fleet, i, poses, sent, cx, cy, interval, last)
-    end_x, end_y = _stop(fleet, i, x, y, vx, vy)
-    east, north = poses[i].east, poses[i].north
-    paths[row].east_0, paths[row].north_0 = east, north
+    end_x, end_y, distance = _stop(fleet, i, x, y, vx, vy)
+    paths[row].east_0, paths[row].north_0 = poses[i].east, poses[i].north
     paths[row].east_1, paths[row].north_1 = x, y
     paths[row].east_2, paths[row].north_2 = end_x, end_y
-    paths[row].reach = math.sqrt((x - east) * (x - east) + (y - north) * (y - north)) + math.sqrt(
-        (end_x - x) * (end_x - x) + (end_y - y) * (end_y - y)
-    )
+    intervals = under_way(fleet, i, interval) + (1 if last else 0)
+    paths[row].reach = intervals * interval * paths[i].fastest + distance
 
 
-@kernel
+@inlined_kernel
 def own_path(
     fleet: Records, i: int, poses: Records, sent: Floats, interval: float, wanted_up: float, airborne: bool,
     paths: Records,
@@ -117,7 +117,7 @@ def path_distance(paths: Records, a: int, b: int) -> float:
     return closest
 
 
-@kernel
+@inlined_kernel
 def same_height(paths: Records, a: int, b: int) -> bool:
     """Whether two paths' heights come so near that horizontal separation is needed."""
     gap = max(paths[a].low - paths[b].high, paths[b].low - paths[a].high)
@@ -148,7 +148,7 @@ def _here_distance(paths: Records, a: int, b: int) -> float:
     )
 
 
-@kernel
+@inlined_kernel
 def _apart(paths: Records, i: int, row: int, separation: float, gain: float) -> bool:
     """Whether candidate ``paths[row]`` of vehicle ``i`` keeps clear of every other vehicle's path.
 
@@ -159,7 +159,7 @@ def _apart(paths: Records, i: int, row: int, separation: float, gain: float) -> 
     """
     wanted = separation + SEPARATION_MARGIN_M
     for j in range(paths.shape[0] - 1):
-        if j == i or paths[j].airborne == 0 or not same_height(paths, i, j):
+        if j == i or paths[j].near == 0 or paths[j].airborne == 0 or not same_height(paths, i, j):
             continue
         dx = paths[j].east_0 - paths[row].east_0
         dy = paths[j].north_0 - paths[row].north_0
@@ -183,18 +183,19 @@ def _within(paths: Records, row: int, edges: Floats) -> bool:
     )
 
 
-@kernel
+@inlined_kernel
 def _accept(
     fleet: Records, i: int, poses: Records, sent: Floats, setpoints: Records, cx: float, cy: float,
     rules: Records, edges: Floats, paths: Records, fenced: bool,
 ) -> bool:  # fmt: skip
     """Whether vehicle ``i`` may be told (cx, cy); if so it owns the new path, and the setpoint is written."""
     row = paths.shape[0] - 1
-    _write_path(fleet, i, poses, sent, cx, cy, rules[0].interval, True, paths, row)
-    if fenced and not _within(paths, row, edges):
-        return False
     interval = rules[0].interval
-    if not _apart(paths, i, row, rules[0].separation, 0.25 * fleet[i].acceleration * interval * interval):
+    _write_path(fleet, i, poses, sent, cx, cy, interval, True, paths, row)
+    if fenced and not _fence_is_far(paths, i) and not _within(paths, row, edges):
+        return False
+    gain = 0.25 * fleet[i].acceleration * interval * interval
+    if paths[i].near != 0 and not _apart(paths, i, row, rules[0].separation, gain):
         return False
     paths[i].east_1, paths[i].north_1 = paths[row].east_1, paths[row].north_1
     paths[i].east_2, paths[i].north_2 = paths[row].east_2, paths[row].north_2
@@ -229,14 +230,53 @@ def _recover(
 
 
 @kernel
-def guard(
+def _changed(wish_x: float, wish_y: float, s: int, k: int) -> tuple[float, float]:
+    """A wish turned and slowed."""
+    return (
+        SPEEDS[s] * (COSINES[k] * wish_x - SINES[k] * wish_y),
+        SPEEDS[s] * (SINES[k] * wish_x + COSINES[k] * wish_y),
+    )
+
+
+@inlined_kernel
+def _fence_is_far(paths: Records, i: int) -> bool:
+    """Whether no stop path of vehicle ``i`` can reach the fence from within its anchor's circle."""
+    return bool(paths[i].hold <= paths[i].clear)
+
+
+@inlined_kernel
+def free(paths: Records, i: int) -> bool:
+    """Whether vehicle ``i`` can do what it wishes: neither the fence nor anybody is near its anchor's circle."""
+    return bool(paths[i].near == 0 and _fence_is_far(paths, i))
+
+
+@kernel
+def _find(
     fleet: Records, i: int, poses: Records, wish_x: float, wish_y: float, rules: Records, edges: Floats,
     paths: Records, sent: Floats, setpoints: Records,
 ) -> None:  # fmt: skip
+    """Try the wish, then what is near to it; where nothing keeps the invariant, brake."""
+    if not _fence_is_far(paths, i) and not fence.inside(edges, poses[i].east, poses[i].north):
+        _recover(fleet, i, poses, sent, setpoints, rules, edges, paths)
+        return
+    for s in range(len(SPEEDS)):
+        for k in range(len(COSINES)):
+            cx, cy = _changed(wish_x, wish_y, s, k)
+            if _accept(fleet, i, poses, sent, setpoints, cx, cy, rules, edges, paths, True):
+                setpoints[i].outcome = KEPT if s == 0 and k == 0 else TURNED
+                return
+    _brake(setpoints, i)
+
+
+@inlined_kernel
+def guard(
+    fleet: Records, i: int, poses: Records, wish_x: float, wish_y: float, rules: Records, edges: Floats,
+    paths: Records, sent: Floats, setpoints: Records, shown: bool,
+) -> None:  # fmt: skip
     """Write vehicle ``i``'s setpoint: the wish (m/s), or the nearest velocity to it that keeps the invariant.
 
-    ``paths`` (V + 1,) holds every vehicle's stop path, and a row for the candidate; ``sent`` (V, 33, 2) the
-    velocities set before, the newest first.
+    ``paths`` (V + 1,) holds every vehicle's stop path, and a row for the candidate; that of a free vehicle is written
+    only if it is ``shown`` to others.  ``sent`` (V, 33, 2) are the velocities set before, the newest first.
     """
     if not (math.isfinite(wish_x) and math.isfinite(wish_y)):
         wish_x, wish_y = 0.0, 0.0
@@ -244,14 +284,10 @@ def guard(
     if size > fleet[i].speed:
         wish_x *= fleet[i].speed / size
         wish_y *= fleet[i].speed / size
-    if not fence.inside(edges, poses[i].east, poses[i].north):
-        _recover(fleet, i, poses, sent, setpoints, rules, edges, paths)
+    if free(paths, i):
+        cx, cy = _changed(wish_x, wish_y, 0, 0)
+        setpoints[i].v_east, setpoints[i].v_north, setpoints[i].outcome = cx, cy, KEPT
+        if shown:
+            _write_path(fleet, i, poses, sent, cx, cy, rules[0].interval, True, paths, i)
         return
-    for s in range(len(SPEEDS)):
-        for k in range(len(COSINES)):
-            cx = SPEEDS[s] * (COSINES[k] * wish_x - SINES[k] * wish_y)
-            cy = SPEEDS[s] * (SINES[k] * wish_x + COSINES[k] * wish_y)
-            if _accept(fleet, i, poses, sent, setpoints, cx, cy, rules, edges, paths, True):
-                setpoints[i].outcome = KEPT if s == 0 and k == 0 else TURNED
-                return
-    _brake(setpoints, i)
+    _find(fleet, i, poses, wish_x, wish_y, rules, edges, paths, sent, setpoints)

@@ -24,6 +24,11 @@ def kernel(function: F) -> F:
     return cast(F, _njit(error_model="numpy", _nrt=False)(function))
 
 
+def inlined_kernel(function: F) -> F:
+    """A kernel that is copied into each that calls it: handing on its arrays would cost more than it does."""
+    return cast(F, _njit(error_model="numpy", _nrt=False, forceinline=True)(function))
+
+
 def allocating_kernel(function: F) -> F:
     """A kernel that makes arrays of its own."""
     return cast(F, _njit(error_model="numpy", _nrt=True)(function))

@@ -8,13 +8,13 @@ Vertically it follows a climb rate within its own limits.  All in metres, second
 import math
 
 from .arrays import Records
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 
 AIRSPEED_SHARE = 1.25
 """What a vehicle can fly through the air, as a share of its speed: against the wind it flies the ground speed told."""
 
 
-@kernel
+@inlined_kernel
 def horizontal(
     east: float, north: float, v_east: float, v_north: float,
     c_east: float, c_north: float, speed: float, acceleration: float, lag: float, dt: float,
@@ -45,7 +45,7 @@ def horizontal(
     )
 
 
-@kernel
+@inlined_kernel
 def vertical(
     up: float, v_up: float, c_up: float, climb: float, descent: float, acceleration: float, dt: float
 ) -> tuple[float, float]:
@@ -55,7 +55,7 @@ def vertical(
     return up + (v_up + 0.5 * change) * dt, v_up + change
 
 
-@kernel
+@inlined_kernel
 def against_wind(
     c_east: float, c_north: float, airspeed: float, wind_east: float, wind_north: float
 ) -> tuple[float, float]:
@@ -67,7 +67,7 @@ def against_wind(
     return wind_east + a_east * airspeed / size, wind_north + a_north * airspeed / size
 
 
-@kernel
+@inlined_kernel
 def carry_on(
     bodies: Records, i: int, c_east: float, c_north: float, c_up: float, speed: float, acceleration: float,
     braking: float, lag: float, climb: float, descent: float, climb_acceleration: float, dt: float,
@@ -96,7 +96,7 @@ def stand(bodies: Records, i: int) -> None:
     bodies[i].v_east, bodies[i].v_north = 0.0, 0.0
 
 
-@kernel
+@inlined_kernel
 def climb_rate_towards(up: float, target: float, climb: float, descent: float, acceleration: float) -> float:
     """The climb rate (m/s) that brings a vehicle at height ``up`` to ``target`` and stops there."""
     gap = target - up

@@ -2,9 +2,9 @@
 
 import math
 
-from . import fence, guard, homing, motion, stages, wire
+from . import anchor, fence, guard, homing, motion, stages, wire
 from .arrays import Floats, Records
-from .jit import kernel
+from .jit import inlined_kernel, kernel
 
 
 @kernel
@@ -21,15 +21,28 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
 
 
 @kernel
+def _anybody_returns(errands: Records) -> bool:
+    """Whether a vehicle is on its way home."""
+    returning = 0
+    for i in range(errands.shape[0]):
+        returning += 1 if stages.WAIT <= errands[i].stage <= stages.LAND else 0
+    return returning > 0
+
+
+@kernel
 def steer(
     fleet: Records, poses: Records, errands: Records, wishes: Records, now: float, rules: Records,
     plan_edges: Floats, guard_edges: Floats, paths: Records, wants: Records, sent: Floats, setpoints: Records,
 ) -> None:  # fmt: skip
     """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
     for i in range(fleet.shape[0]):
-        airborne = stages.airborne(errands[i].stage)
-        up = _wanted_up(fleet, errands, poses, i)
-        guard.own_path(fleet, i, poses, sent, rules[0].interval, up, airborne, paths)
+        anchor.settle(fleet, i, poses, rules, guard_edges, paths)
+    shown = _anybody_returns(errands)  # who looks at everybody's paths
+    for i in range(fleet.shape[0]):
+        if shown or not guard.free(paths, i):
+            airborne = stages.airborne(errands[i].stage)
+            up = _wanted_up(fleet, errands, poses, i)
+            guard.own_path(fleet, i, poses, sent, rules[0].interval, up, airborne, paths)
     for i in range(fleet.shape[0]):
         stage = errands[i].stage
         wants[i].v_east, wants[i].v_north, wants[i].up = 0.0, 0.0, fleet[i].altitude
@@ -40,17 +53,18 @@ def steer(
         setpoints[i].up = wants[i].up
         if stages.SEARCH <= stage <= stages.LAND:
             guard.guard(
-                fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, sent, setpoints
-            )
+                fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, sent, setpoints,
+                shown,
+            )  # fmt: skip
         else:
             setpoints[i].v_east, setpoints[i].v_north = 0.0, 0.0
             setpoints[i].outcome = guard.UNGUARDED
-        for h in range(sent.shape[1] - 1, 0, -1):
+        for h in range(guard.under_way(fleet, i, rules[0].interval), 0, -1):
             sent[i, h, 0], sent[i, h, 1] = sent[i, h - 1, 0], sent[i, h - 1, 1]
         sent[i, 0, 0], sent[i, 0, 1] = setpoints[i].v_east, setpoints[i].v_north
 
 
-@kernel
+@inlined_kernel
 def _fly(
     fleet: Records, truth: Records, i: int, c_east: float, c_north: float, c_up: float, descent: float,
     rules: Records,
@@ -96,7 +110,7 @@ def go_on(
     """One setpoint tick of a study: steer by what is seen, move what is there, and look."""
     steer(fleet, poses, errands, wishes, now, rules, plan_edges, guard_edges, paths, wants, sent, setpoints)
     move(fleet, truth, errands, sent, setpoints, rules)
-    watch(truth, errands, raw_edges, account)
+    watch(truth, errands, raw_edges, paths, account)
     wire.observe(truth, poses, rules)
 
 
@@ -121,20 +135,22 @@ def all_landed(errands: Records) -> bool:
 
 
 @kernel
-def watch(poses: Records, errands: Records, raw_edges: Floats, account: Floats) -> None:
+def watch(poses: Records, errands: Records, raw_edges: Floats, paths: Records, account: Floats) -> None:
     """Add this tick to ``account``: nearest approach (m), vehicle-ticks outside, standing, searching."""
     for i in range(poses.shape[0]):
         if not stages.airborne(errands[i].stage):
             continue
-        if not fence.inside(raw_edges, poses[i].east, poses[i].north):
+        x, y = poses[i].east, poses[i].north
+        if not anchor.surely_inside(paths, i, x, y) and not fence.inside(raw_edges, x, y):
             account[1] += 1.0
         if errands[i].stage == stages.SEARCH:
             speed = math.sqrt(poses[i].v_east * poses[i].v_east + poses[i].v_north * poses[i].v_north)
             account[2] += 1.0 if speed < 0.5 else 0.0
             account[3] += 1.0
         for j in range(i):
-            if not stages.airborne(errands[j].stage):
+            dx, dy = x - poses[j].east, y - poses[j].north
+            squared = dx * dx + dy * dy
+            if squared > account[0] * account[0] or not stages.airborne(errands[j].stage):
                 continue
             if abs(poses[i].up - poses[j].up) < guard.HEIGHT_SEPARATION_M:
-                dx, dy = poses[i].east - poses[j].east, poses[i].north - poses[j].north
-                account[0] = min(account[0], math.sqrt(dx * dx + dy * dy))
+                account[0] = min(account[0], math.sqrt(squared))

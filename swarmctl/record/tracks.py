@@ -32,27 +32,36 @@ LONG_AREA = 2.2  # width over height from which the curve goes below the map
 KILOMETRES_FROM_M = 2000.0
 
 
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """What is drawn.  Positions are metres east and north, shape (n, 2); times are seconds of search.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Map:
+    """What is drawn of a run on the ground.  Positions are metres east and north, shape (n, 2).
 
     Targets are drawn where they were laid out, also those that move from there (``subtitle_of`` says so).
-    ``found`` (T,) tells which of the targets (T, 2) were; ``fraction`` (P,), 0 to 1, is the share found at
-    ``times_s`` (P,); ``crossings`` has the time of each level in percent, None where it was not reached.
+    ``found`` (T,) tells which of the targets (T, 2) were; ``tracks`` has one track a vehicle.
     """
 
-    algorithm: str
     border: Floats
     keep_outs: Sequence[Floats]
     targets: Floats
     found: Flags
     tracks: Sequence[Floats]
+    returns: Sequence[Floats] = ()  #: ways home, (n, 2) each; ``tracks`` then end where the search did
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture(Map):
+    """What is drawn in tracks.png: the map, and the curve beside it.  Times are seconds of search.
+
+    ``fraction`` (P,), 0 to 1, is the share found at ``times_s`` (P,); ``crossings`` has the time of each level in
+    percent, None where it was not reached.
+    """
+
+    algorithm: str
     times_s: Floats
     fraction: Floats
     crossings: Mapping[str, float | None]
     duration_s: float
     subtitle: str = ""
-    returns: Sequence[Floats] = ()  #: ways home, (n, 2) each; ``tracks`` then end where the search did
 
 
 def subtitle_of(mission: Mission, seed: int) -> str:
@@ -64,17 +73,27 @@ def subtitle_of(mission: Mission, seed: int) -> str:
 def draw(path: Path, picture: Picture) -> None:
     """Write the picture as PNG.  Raises RunFolderError where ``path`` cannot be written."""
     figure, chart, curve = _figure(picture)
-    _draw_area(chart, picture)
-    _draw_tracks(chart, picture)
-    _draw_targets(chart, picture)
-    _draw_axes(chart, picture)
+    draw_map(chart, picture)
     _draw_curve(curve, picture)
-    _draw_legend(figure, picture)
+    draw_legend(figure, picture)
     _draw_title(figure, chart, picture)
-    figure.draw_without_rendering()  # settles the layout, which the numbers' places depend on
-    figure.set_layout_engine("none")
-    _draw_numbers(chart, picture)
+    settle(figure)
+    draw_numbers(chart, picture)
     save(figure, path)
+
+
+def draw_map(chart: Axes, shown: Map) -> None:
+    """Everything of a map but its numbers."""
+    _draw_area(chart, shown)
+    _draw_tracks(chart, shown)
+    _draw_targets(chart, shown)
+    _draw_axes(chart, shown)
+
+
+def settle(figure: Figure) -> None:
+    """Fix the layout, which the numbers' places depend on."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
 
 def _figure(picture: Picture) -> tuple[Figure, Axes, Axes]:
@@ -93,11 +112,11 @@ def _figure(picture: Picture) -> tuple[Figure, Axes, Axes]:
     return figure, panels[0], panels[1]
 
 
-def _draw_area(chart: Axes, picture: Picture) -> None:
+def _draw_area(chart: Axes, shown: Map) -> None:
     """The ground, the area on it and the keep-outs in it."""
     chart.set_facecolor(GROUND)
-    chart.add_patch(Polygon(picture.border, facecolor="white", edgecolor=INK, linewidth=1.4, zorder=1))
-    for keep_out in picture.keep_outs:
+    chart.add_patch(Polygon(shown.border, facecolor="white", edgecolor=INK, linewidth=1.4, zorder=1))
+    for keep_out in shown.keep_outs:
         chart.add_patch(_keep_out(keep_out))
 
 
@@ -108,22 +127,22 @@ def _keep_out(corners: Floats) -> Polygon:
     )
 
 
-def _colour(vehicle: int) -> str:
+def colour_of(vehicle: int) -> str:
     return COLOURS[vehicle % len(COLOURS)]
 
 
-def _draw_tracks(chart: Axes, picture: Picture) -> None:
+def _draw_tracks(chart: Axes, shown: Map) -> None:
     """Every track, thinner where there are many, with its launch and its end."""
-    many = len(picture.tracks) > 12
+    many = len(shown.tracks) > 12
     width, size = (0.6, 4.5) if many else (1.0, 7.0)
-    for vehicle, way in enumerate(picture.returns):
+    for vehicle, way in enumerate(shown.returns):
         if len(way):
             home: Style = {"linestyle": (0, (5, 4)), "linewidth": 0.8 * width, "alpha": 0.45}
-            chart.plot(*_thinned(way).T, **home, color=_colour(vehicle), zorder=2.5)
-    for vehicle, track in enumerate(picture.tracks):
+            chart.plot(*_thinned(way).T, **home, color=colour_of(vehicle), zorder=2.5)
+    for vehicle, track in enumerate(shown.tracks):
         if len(track) == 0:
             continue
-        colour = _colour(vehicle)
+        colour = colour_of(vehicle)
         chart.plot(*_thinned(track).T, color=colour, linewidth=width, alpha=0.75, zorder=3)
         end: Style = {
             "marker": "s",
@@ -147,9 +166,9 @@ def _thinned(track: Floats) -> Floats:
     return np.concatenate([track[:-1:step], track[-1:]])
 
 
-def _draw_targets(chart: Axes, picture: Picture) -> None:
+def _draw_targets(chart: Axes, shown: Map) -> None:
     """Found ones filled, missed ones hollow, on top of the tracks."""
-    size = float(np.clip(60.0 / max(1.0, np.sqrt(len(picture.targets))), 2.2, 6.0))
+    size = float(np.clip(60.0 / max(1.0, np.sqrt(len(shown.targets))), 2.2, 6.0))
     dots: Style = {
         "linestyle": "none",
         "marker": "o",
@@ -157,14 +176,14 @@ def _draw_targets(chart: Axes, picture: Picture) -> None:
         "markeredgewidth": 0.7,
         "zorder": 5,
     }
-    found, missed = picture.targets[picture.found], picture.targets[~picture.found]
+    found, missed = shown.targets[shown.found], shown.targets[~shown.found]
     chart.plot(*missed.T, **dots, markerfacecolor="white", markeredgecolor=INK)
     chart.plot(*found.T, **dots, markerfacecolor=INK, markeredgecolor="white")
 
 
-def _draw_axes(chart: Axes, picture: Picture) -> None:
+def _draw_axes(chart: Axes, shown: Map) -> None:
     """Equal scales, in metres or kilometres, a little more than the area in view."""
-    low, high = picture.border.min(axis=0), picture.border.max(axis=0)
+    low, high = shown.border.min(axis=0), shown.border.max(axis=0)
     room = 0.03 * float(np.max(high - low))
     chart.set_xlim(low[0] - room, high[0] + room)
     chart.set_ylim(low[1] - room, high[1] + room)
@@ -236,33 +255,31 @@ def _draw_crossing(curve: Axes, level: str, time_s: float, *, late: bool) -> Non
     )
 
 
-def _draw_legend(figure: Figure, picture: Picture) -> None:
+def draw_legend(figure: Figure, shown: Map, rows: int = 1) -> None:
     """What the map's signs mean, below everything."""
-    found = int(np.count_nonzero(picture.found))
+    found = int(np.count_nonzero(shown.found))
     dot: Style = {"linestyle": "none", "marker": "o", "markersize": 6}
     square: Style = {"linestyle": "none", "marker": "s", "markersize": 8, "markerfacecolor": "white"}
     handles: list[Line2D | Patch] = [
         Line2D([], [], linestyle="none", marker="^", markersize=7, color=GREY, label="launch"),
-        Line2D(
-            [], [], **square, markeredgecolor=GREY, label="end of the search" if picture.returns else "end"
-        ),
+        Line2D([], [], **square, markeredgecolor=GREY, label="end of the search" if shown.returns else "end"),
         Line2D([], [], **dot | {"markersize": 11}, color=GREY, label="vehicle's number"),
     ]
-    if picture.returns:
+    if shown.returns:
         handles.append(Line2D([], [], linestyle=(0, (5, 4)), linewidth=0.9, color=GREY, label="way home"))
-    if len(picture.targets):
-        missed = len(picture.targets) - found
+    if len(shown.targets):
+        missed = len(shown.targets) - found
         handles.append(Line2D([], [], **dot, color=INK, label=f"found: {found}"))
         hollow: Style = {"markerfacecolor": "white", "markeredgecolor": INK}
         handles.append(Line2D([], [], **dot, **hollow, label=f"missed: {missed}"))
-    if picture.keep_outs:
+    if shown.keep_outs:
         sample = _keep_out(np.zeros((3, 2)))
         sample.set_label("keep-out")
         handles.append(sample)
     figure.legend(
         handles=handles,
         loc="outside lower center",
-        ncols=len(handles),
+        ncols=-(-len(handles) // rows),
         frameon=False,
         fontsize=9.5,
         labelcolor=INK,
@@ -280,12 +297,12 @@ def _draw_title(figure: Figure, chart: Axes, picture: Picture) -> None:
     chart.set_title(picture.subtitle, fontsize=10, color=GREY, loc="left", pad=8)
 
 
-def _draw_numbers(chart: Axes, picture: Picture) -> None:
+def draw_numbers(chart: Axes, shown: Map) -> None:
     """Each vehicle's number in a badge on its track, there where it is furthest from all other signs.
 
     A vehicle whose whole track lies under other signs gets none.
     """
-    flown = [(vehicle, track) for vehicle, track in enumerate(picture.tracks) if len(track)]
+    flown = [(vehicle, track) for vehicle, track in enumerate(shown.tracks) if len(track)]
     taken = [chart.transData.transform(track[end]) for _, track in flown for end in (0, -1)]
     for vehicle, track in flown:
         places = track[np.linspace(0, len(track) - 1, BADGE_PLACES).astype(int)]
@@ -294,12 +311,12 @@ def _draw_numbers(chart: Axes, picture: Picture) -> None:
         best = int(np.argmax(nearest))
         if nearest[best] >= BADGE_PIXELS:
             taken.append(pixels[best])
-            _draw_badge(chart, vehicle, places[best])
+            draw_badge(chart, vehicle, places[best])
 
 
-def _draw_badge(chart: Axes, vehicle: int, place: Floats) -> None:
+def draw_badge(chart: Axes, vehicle: int, place: Floats) -> None:
     """The number, counted from 1, on a disc of the vehicle's colour."""
-    colour = _colour(vehicle)
+    colour = colour_of(vehicle)
     points = BADGE_PIXELS * 72 / DPI
     disc: Style = {"markerfacecolor": colour, "markeredgecolor": "white", "markeredgewidth": 0.8}
     chart.plot(*place, marker="o", markersize=points, **disc, zorder=8)

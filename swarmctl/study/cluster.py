@@ -8,6 +8,7 @@ Bit-equality is promised on one kind of CPU.  Workers of several kinds are there
 kind that is not this machine's, the results are those of their kind, which is told.
 """
 
+import asyncio
 import hashlib
 import logging
 import os
@@ -93,16 +94,26 @@ def _connect(address: str) -> "Client":
     if find_spec("distributed") is None:
         raise ClusterError("--cluster needs the extra: pip install 'swarmctl[cluster]'")
     from distributed import Client
-    from distributed.comm import resolve_address
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said here, in one line
     try:
-        resolve_address(address)  # a client that cannot even try would complain to the terminal
+        asyncio.run(_greet(address))
         return Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError, RuntimeError) as error:  # the last two: TLS here or there alone
         raise ClusterError(
             f"{address}: no Dask scheduler answers there ({error or type(error).__name__}; start one: dask scheduler)"
         ) from None
+
+
+async def _greet(address: str) -> None:
+    """Connect and part: a client that cannot connect leaves complaints at the terminal, this only raises."""
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    arguments = Security().get_connection_args("client")
+    # A time limit of our own: theirs ends with the connection, and somebody else's server may never say a word.
+    greeted = await asyncio.wait_for(connect(address, timeout=CONNECT_S, **arguments), CONNECT_S)
+    await greeted.close()
 
 
 def _agreed(client: "Client", address: str, say: Say) -> Code:

@@ -18,6 +18,7 @@ from .runs import Job, is_ideal, simulate
 CHUNK = 25
 """Runs a job: small enough for a smooth progress bar, large enough to cost nothing."""
 
+Simulate = Callable[[Job], Records]
 Done = Callable[[int], None]
 """Called with how many more runs are done."""
 
@@ -39,9 +40,14 @@ def local(workers: int | None = None) -> Iterator[Executor]:
             raise
 
 
-def run_jobs(jobs: Sequence[Job], executor: Executor, done: Done = lambda runs: None) -> list[Records]:
-    """Each job's RUN records, in the jobs' order, whoever finishes first; a job's error is raised here."""
-    places: dict[Future[Records], int] = {executor.submit(simulate, job): k for k, job in enumerate(jobs)}
+def run_jobs(
+    jobs: Sequence[Job], executor: Executor, done: Done = lambda runs: None, run: Simulate = simulate
+) -> list[Records]:
+    """Each job's records, in the jobs' order, whoever finishes first; a job's error is raised here.
+
+    ``run`` does a job: RUN records, unless something else than ``simulate`` is given.
+    """
+    places: dict[Future[Records], int] = {executor.submit(run, job): k for k, job in enumerate(jobs)}
     results: list[Records] = [np.zeros(0)] * len(jobs)
     for future in as_completed(places):
         results[places[future]] = future.result()

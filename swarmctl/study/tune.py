@@ -96,7 +96,7 @@ class Question:
     @property
     def default(self) -> Setting:
         """The searched parameters as they are without tuning."""
-        return {p.name: p.default for p in self.searched}
+        return {p.name: p.number(p.default) for p in self.searched}
 
     def with_setting(self, setting: Setting) -> Mission:
         """The mission flown with that setting."""

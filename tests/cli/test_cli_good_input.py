@@ -13,7 +13,7 @@ from swarmctl.core import planners
 
 from .given import Swarmctl
 
-COMMANDS = ("fly", "replay", "control", "check", "algos", "report")
+COMMANDS = ("fly", "study", "replay", "control", "check", "algos", "report")
 
 
 def test_fly_prints_its_figures_and_where_they_are(swarmctl: Swarmctl, small: Path, tmp_path: Path) -> None:

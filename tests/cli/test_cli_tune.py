@@ -76,7 +76,7 @@ def test_a_tuning_that_was_ended_from_outside_goes_on(
         process.kill()
     if by != signal.SIGKILL:
         assert process.returncode == 4
-        assert said.splitlines()[-1] == f"stopped; what was finished is kept: go on with: --out {out}"
+        assert said.splitlines()[-2:] == [f"what was finished is kept: go on with --out {out}", "stopped"]
     again = swarmctl(*options, out)
     assert again.exit_code == 0, again.stderr
     assert "of them are there already" in again.stderr
@@ -111,6 +111,7 @@ def finished_in(file: Path) -> int:
         ),
         (("--set", "planner.inertia=0.5"), "nothing to tune"),
         (("--set", "duration_s"), "KEY=VALUE"),
+        (("--set", "duration_s=20,30"), "--set duration_s: tuning is for one mission"),
         (("--set", "duration_s=soon"), "command line: duration_s"),
         (("--cluster", "tcp://127.0.0.1:9", "--workers", "2"), "no --workers"),
         (("--cluster", "127.0.0.1"), "no Dask scheduler answers there"),

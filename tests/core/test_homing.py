@@ -53,7 +53,7 @@ class Return:
         for _ in range(round(most_s / 0.1)):
             w.steer(self.tick * 0.1)
             move(w.fleet, w.poses, w.errands, w.sent, w.setpoints, w.rules)
-            watch(w.poses, w.errands, w.fences.raw, self.account)
+            watch(w.poses, w.errands, w.fences.raw, w.paths, self.account)
             for i, stage in enumerate(w.errands["stage"]):
                 self.times.setdefault((i, int(stage)), self.tick * 0.1)
             self.tick += 1

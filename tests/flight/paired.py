@@ -18,7 +18,6 @@ from swarmctl.flight import fly as flight
 from swarmctl.flight.lockstep import Lockstep
 from swarmctl.flight.preparation import Preparation
 from swarmctl.flight.swarm import Part, Swarm
-from swarmctl.flight.track import Track
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
 from swarmctl.vehicle.session import Session
@@ -111,9 +110,8 @@ class Pair:
         for name in names:
             flown, studied = getattr(self.flown, name), getattr(self.studied, name)
             if flown.tobytes() != studied.tobytes():
-                raise AssertionError(
-                    f"setpoint tick {self.ticks}, planner tick {self._planned}: {first_difference(name, flown, studied)}"
-                )
+                where = f"setpoint tick {self.ticks}, planner tick {self._planned}"
+                raise AssertionError(f"{where}: {first_difference(name, flown, studied)}")
 
 
 def first_difference(name: str, flown: npt.NDArray[Any], studied: npt.NDArray[Any]) -> str:

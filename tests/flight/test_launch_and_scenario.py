@@ -118,6 +118,23 @@ def test_ideal_vehicles_start_together_on_the_border_and_drawn_headings_are_kept
     assert scenario.fences.plan[:, 0].max() == 5000.0
 
 
+@pytest.mark.parametrize("ideal", [True, False])
+def test_spread_vehicles_start_all_over_the_area_on_any_heading_as_drawn(ideal: bool) -> None:
+    scenario = Scenario(paper(vehicles__count=300, vehicles__launch="spread"), ideal=ideal)
+    world = scenario.world(5)
+    assert world.poses["east"].tolist() == scenario.starts[:, 0].tolist()
+    assert np.ptp(scenario.starts, axis=0).min() > 4500.0
+    drawn = launch.draw_headings((0.0, 2.0 * np.pi), 300, 5)
+    assert np.cos(headings_of(world) - drawn) == pytest.approx(1.0)
+    assert np.histogram(drawn, 4, (0.0, 2.0 * np.pi))[0].min() > 50
+
+
+def test_pads_that_the_mission_names_are_those_of_ideal_vehicles_too() -> None:
+    pads = [[100.0, 200.0], [400.0, 300.0]]
+    scenario = Scenario(paper(vehicles__count=2, vehicles__launch=pads), ideal=True)
+    assert scenario.starts.tolist() == pads
+
+
 def test_a_multicopters_fences_have_their_margins() -> None:
     fences = Scenario(paper(), ideal=False).fences
     assert (fences.raw[:, 0].max(), fences.plan[:, 0].max(), fences.guard[:, 0].max()) == (5000, 4980, 4990)

@@ -62,11 +62,10 @@ def by_an_ulp(tick: int, world: World) -> None:
 
 
 def test_a_wish_that_differs_by_one_ulp_is_found_and_named() -> None:
-    said = rf"setpoint tick {10 * MEDDLED_AT}, planner tick {MEDDLED_AT}: vehicle {MEDDLED_WITH + 1}: wishes\.v_north is"
+    tick = rf"setpoint tick {10 * MEDDLED_AT}, planner tick {MEDDLED_AT}"
+    said = rf"{tick}: vehicle {MEDDLED_WITH + 1}: wishes\.v_north is"
     with pytest.raises(AssertionError, match=said):
         Pair(reference("fco", duration_s=20.0), 1, by_an_ulp).fly()
-
-
 
 
 def test_a_study_that_sees_exactly_is_another_one() -> None:

@@ -115,7 +115,7 @@ def badges(run: Picture, monkeypatch: pytest.MonkeyPatch, path: Path) -> dict[in
     def note(chart: Axes, vehicle: int, place: Floats) -> None:
         placed[vehicle] = (chart, place)
 
-    monkeypatch.setattr(tracks, "_draw_badge", note)
+    monkeypatch.setattr(tracks, "draw_badge", note)
     draw(path, run)
     return {vehicle: chart.transData.transform(place) for vehicle, (chart, place) in placed.items()}
 

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -11,10 +12,13 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
+import llvmlite.binding
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from distributed import Client
 
+from swarmctl.cli import main
 from swarmctl.core.arrays import Records
 from swarmctl.mission.load import load
 from swarmctl.study import cluster as clusters
@@ -25,6 +29,7 @@ from swarmctl.study.errors import ClusterError
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 60.0
 RUNS = range(1, 241)
+OF_THE_MACHINE = ("wall_s", "uav_steps_per_s", "threads", "run", "machine")
 
 
 def until(met: Callable[[], bool]) -> None:
@@ -68,10 +73,18 @@ def worker(address: str, name: str, **settings: str) -> AbstractContextManager[s
     return started("dask", "worker", address, *options, **settings)
 
 
-@pytest.fixture
-def address(tmp_path: Path) -> Iterator[str]:
-    with scheduler(tmp_path) as (address, _):
+@pytest.fixture(scope="module")
+def lasting(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with scheduler(tmp_path_factory.mktemp("scheduler")) as (address, _):
         yield address
+
+
+@pytest.fixture
+def address(lasting: str) -> str:
+    """A scheduler that has lost the workers of the test before."""
+    with Client(lasting) as client:
+        until(lambda: not client.nthreads())
+    return lasting
 
 
 def study(executor: execute.Executor, done: execute.Done = lambda runs: None) -> Records:
@@ -105,6 +118,24 @@ def test_a_worker_killed_in_mid_study_changes_no_bit(address: str) -> None:
         assert lost
         assert list(client.nthreads()) == [address_of(client, "stays")]
     assert there.tobytes() == here.tobytes()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("study", "--algo", "fco", "--runs", "20"), ("tune", "--algo", "fco", "--trials", "3", "--runs", "8")],
+)
+def test_commands_come_to_the_same_on_a_cluster(
+    command: tuple[str, ...], address: str, tmp_path: Path
+) -> None:
+    def told(*options: str) -> dict[str, object]:
+        result = CliRunner().invoke(main, [*command, "--json", *options])
+        assert result.exit_code == 0, result.stderr
+        content = json.loads(result.stdout)
+        return {key: value for key, value in content.items() if key not in OF_THE_MACHINE}
+
+    with worker(address, "only"):
+        there = told("--cluster", address, "--out", str(tmp_path / "there"))
+    assert there == told("--workers", "2", "--out", str(tmp_path / "here"))
 
 
 def test_a_scheduler_that_dies_in_mid_study_is_an_error_and_no_waiting(tmp_path: Path) -> None:
@@ -161,6 +192,24 @@ def test_workers_of_one_kind_may_be_another_kind_than_this_machine() -> None:
         judge({"a": other, "b": code()})
 
 
+def test_workers_of_another_kind_than_this_machine_are_told(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theirs = code()["CPU"]
+    monkeypatch.setattr(llvmlite.binding, "get_host_cpu_name", lambda: "z80")  # here, not on the worker
+    code.cache_clear()
+    said: list[str] = []
+    try:
+        with worker(address, "only"), cluster(address, said.append):
+            pass
+    finally:
+        code.cache_clear()
+    assert said == [
+        f"cluster at {address}: 1 workers, {theirs}",
+        "this machine is z80: here the same study may differ in the last digits",
+    ]
+
+
 def test_a_worker_without_swarmctl_is_named() -> None:
     missing = ModuleNotFoundError("No module named 'swarmctl'")
     with pytest.raises(ClusterError, match=r"worker b: No module named 'swarmctl'"):
@@ -171,6 +220,20 @@ def test_a_scheduler_without_workers_is_refused(address: str, monkeypatch: pytes
     monkeypatch.setattr(clusters, "WORKERS_S", 0.1)
     with pytest.raises(ClusterError, match=rf"{address}: the scheduler has no workers"):
         enter(address)
+
+
+def test_a_port_where_somebody_else_answers_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clusters, "CONNECT_S", 0.3)
+    with (
+        socket.create_server(("127.0.0.1", 0)) as somebody,
+        pytest.raises(ClusterError, match=r"no Dask scheduler answers there"),
+    ):
+        enter(f"tcp://127.0.0.1:{somebody.getsockname()[1]}")
+
+
+def test_tls_that_is_not_set_up_is_said(address: str) -> None:
+    with pytest.raises(ClusterError, match=r"no Dask scheduler answers there .*TLS"):
+        enter(address.replace("tcp:", "tls:"))
 
 
 @pytest.mark.parametrize(

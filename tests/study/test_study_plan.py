@@ -100,3 +100,23 @@ def test_the_mission_that_is_kept_holds_every_algorithm_s_parameters() -> None:
     kept = merged(cell)
     assert kept.planner.parameters["fco"]["inertia"] == kept.planner.parameters["mdc"]["inertia"] == 0.7
     assert kept.duration_s == 100
+
+
+def test_at_constant_density_the_mission_grows_with_its_vehicles() -> None:
+    plan = make_plan(None, ["fco", "mdc"], SEEDS, {}, ["vehicles.count=6,24"], constant_density=True)
+    small, large = (list(cell.missions.values()) for cell in plan.cells)
+    assert {m.area.size_m for m in small} == {(5000.0, 5000.0)}
+    assert {m.area.size_m for m in large} == {(10000.0, 10000.0)}
+    assert {(len(m.fleet), m.targets.count, m.targets.clusters) for m in large} == {(24, 1800, 24)}
+    assert [cell.settings for cell in plan.cells] == [{"vehicles.count": 6}, {"vehicles.count": 24}]
+
+
+@pytest.mark.parametrize("count", ["0", "2.5", "many", "20000"])
+def test_an_impossible_number_of_vehicles_is_told_at_constant_density_too(count: str) -> None:
+    with pytest.raises(MissionError, match=r"command line: vehicles\.count"):
+        make_plan(None, ["fco"], SEEDS, {}, [f"vehicles.count=6,{count}"], constant_density=True)
+
+
+def test_constant_density_needs_a_number_of_vehicles() -> None:
+    with pytest.raises(StudyError, match="--constant-density needs --vehicles N"):
+        make_plan(None, ["fco"], SEEDS, {}, [], constant_density=True)

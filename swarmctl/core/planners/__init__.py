@@ -28,7 +28,9 @@ def module(name: str) -> ModuleType:
 
 def limits() -> dict[str, dict[str, tuple[float, float]]]:
     """Every algorithm with its parameters' least and greatest values; those that are choices have none."""
-    return {name: {p.name: (p.low, p.high) for p in module(name).PARAMETERS if not p.choices} for name in MODULES}
+    return {
+        name: {p.name: (p.low, p.high) for p in module(name).PARAMETERS if not p.choices} for name in MODULES
+    }
 
 
 def choices() -> dict[str, dict[str, tuple[str, ...]]]:

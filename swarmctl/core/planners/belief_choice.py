@@ -28,7 +28,9 @@ def meet(memory: Records, i: int, j: int, at: float, east: float, north: float) 
 
 
 @kernel
-def _other_nearer(memory: Records, i: int, since: float, places: int, east: float, north: float, mine: float) -> bool:
+def _other_nearer(
+    memory: Records, i: int, since: float, places: int, east: float, north: float, mine: float
+) -> bool:
     """Whether a vehicle heard of since then was nearer to a place than ``mine`` metres."""
     for k in range(places):
         if memory[i].met_at[k] >= since:
@@ -84,7 +86,9 @@ def _away(low: float, value: float, high: float) -> float:
 
 
 @kernel
-def _least_time(memory: Records, i: int, fleet: Records, poses: Records, settings: Records, block: int) -> float:
+def _least_time(
+    memory: Records, i: int, fleet: Records, poses: Records, settings: Records, block: int
+) -> float:
     """Less time (s) than any cell of a block takes."""
     row, column = grid.BLOCK * (block // grid.BLOCKS), grid.BLOCK * (block % grid.BLOCKS)
     side = (grid.BLOCK - 1) * memory[i].cell

@@ -12,7 +12,6 @@ in the 5 × 5 block about it, brought up to date cell by cell as visits and targ
 
 import math
 
-from .. import fence
 from ..arrays import Floats, Records
 from ..jit import kernel
 from . import sectors
@@ -53,13 +52,13 @@ def within(low: int, value: int, high: int) -> int:
 @kernel
 def rows_of(memory: Records, i: int) -> int:
     """How many rows the window has."""
-    return min(memory[i].rows, SIDE)
+    return int(min(memory[i].rows, SIDE))
 
 
 @kernel
 def columns_of(memory: Records, i: int) -> int:
     """How many columns the window has."""
-    return min(memory[i].columns, SIDE)
+    return int(min(memory[i].columns, SIDE))
 
 
 @kernel
@@ -100,9 +99,10 @@ def lay_cells(memory: Records, i: int, fleet: Records, edges: Floats, share: flo
         reach = min(reach, fleet[j].sensor_range)
     size = max(east - west, north - south)
     cell = min(max(share * reach, size / SIDE), most * reach)
-    memory[i].cell, memory[i].west, memory[i].south = cell, west, south
-    memory[i].columns = max(math.ceil((east - west) / cell - 1e-9), 1)
-    memory[i].rows = max(math.ceil((north - south) / cell - 1e-9), 1)
+    columns, rows = max(round((east - west) / cell), 1), max(round((north - south) / cell), 1)
+    memory[i].cell, memory[i].columns, memory[i].rows = cell, columns, rows
+    memory[i].west = 0.5 * (west + east - columns * cell)
+    memory[i].south = 0.5 * (south + north - rows * cell)
 
 
 @kernel
@@ -130,9 +130,7 @@ def _legal_columns(memory: Records, i: int, edges: Floats, row: int) -> int:
 
 
 @kernel
-def fill_window(
-    memory: Records, i: int, edges: Floats, contacts: Records, known: int, reach: float
-) -> None:
+def fill_window(memory: Records, i: int, edges: Floats, contacts: Records, known: int, reach: float) -> None:
     """Work ``cells`` out anew from what is legal, known and visited."""
     cells = memory[i].cells
     for k in range(STRIDE * STRIDE):
@@ -144,7 +142,9 @@ def fill_window(
                 ours = sectors.own(memory, i, east_of(memory, i, column), north_of(memory, i, row))
                 cells[place(row, column)] = OWN if ours else FOREIGN
     for block in range(BLOCKS * BLOCKS):
-        inside = block // BLOCKS * BLOCK < rows_of(memory, i) and block % BLOCKS * BLOCK < columns_of(memory, i)
+        inside = block // BLOCKS * BLOCK < rows_of(memory, i) and block % BLOCKS * BLOCK < columns_of(
+            memory, i
+        )
         memory[i].ceilings[block] = 9 * memory[i].worth[PROMISING] if inside else 0
     for row in range(SIDE):
         word = memory[i].visited[row]
@@ -273,5 +273,6 @@ def take_over(memory: Records, i: int, beacons: Records, slot: int, j: int) -> N
     """Mark what vehicle ``j`` says was visited, as far as the two windows overlap."""
     across = beacons[slot, j].first_column - memory[i].first_column
     up = beacons[slot, j].first_row - memory[i].first_row
-    for row in range(max(up, 0), min(SIDE + up, SIDE)):
+    rows = rows_of(memory, i)
+    for row in range(max(up, 0), min(rows + up, rows)):
         visit_row(memory, i, row, _shifted(beacons[slot, j].visited[row - up], across))

@@ -143,4 +143,4 @@ def own(memory: Records, i: int, east: float, north: float) -> bool:
     x, y = east - memory[i].launch_east, north - memory[i].launch_north
     after_left = memory[i].left_east * y - memory[i].left_north * x >= 0.0
     before_right = memory[i].right_east * y - memory[i].right_north * x < 0.0
-    return (after_left or before_right) if memory[i].wide != 0 else (after_left and before_right)
+    return bool((after_left or before_right) if memory[i].wide != 0 else (after_left and before_right))
