@@ -96,6 +96,7 @@ def study(
         ending.callback(folder.remove_if_empty)
         executor = ending.enter_context(executor_of(workers, address))
         try:
+            _warm_up(under_way, executor, address is None)
             _fly(under_way, executor, check)
         except KeyboardInterrupt:
             say("stopping; press Ctrl-C again to stop at once")
@@ -153,12 +154,20 @@ def compiling(name: str) -> None:
     say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
 
 
+def _warm_up(under_way: "Study", executor: "Executor", here: bool) -> None:
+    """Have everything compiled before the clock starts."""
+    if not here:
+        say("the workers load their kernels, or compile them: a first start takes some seconds an algorithm")
+        under_way.warm_up_elsewhere(executor)
+        return
+    under_way.warm_up(compiling)
+
+
 def _fly(under_way: "Study", executor: "Executor", check: Check) -> None:
     """Do the runs, and show how far they are."""
     from .flight.clock import wall_s
 
     plan = under_way.plan
-    under_way.warm_up(compiling)
     say(_intention(plan))
     with _progress(plan, check) as (done, finished):
         under_way.fly(executor, wall_s, done, finished)

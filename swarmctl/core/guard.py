@@ -33,15 +33,15 @@ SINES = tuple(math.sin(math.radians(a)) for a in TURNS)
 
 
 @inlined_kernel
-def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
-    """Where vehicle ``i``, braking from velocity (vx, vy) at (x, y), stands still."""
+def _stop(fleet: Records, i: int, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
+    """Where vehicle ``i``, braking from velocity (vx, vy) at (x, y), stands still, and how far (m) that is."""
     speed = math.sqrt(vx * vx + vy * vy)
     if speed < 1e-9:
-        return x, y
+        return x, y, 0.0
     braking = BRAKING_SHARE * fleet[i].braking
     lag = fleet[i].lag
     distance = speed * speed / (2.0 * braking) + min(speed, braking * lag) * lag
-    return x + distance * vx / speed, y + distance * vy / speed
+    return x + distance * vx / speed, y + distance * vy / speed, distance
 
 
 @inlined_kernel
@@ -76,14 +76,12 @@ def _write_path(
 ) -> None:  # fmt: skip
     """Write into ``paths[row]`` the path vehicle ``i`` owns, or will own after an interval of (cx, cy)."""
     x, y, vx, vy = _coast(fleet, i, poses, sent, cx, cy, interval, last)
-    end_x, end_y = _stop(fleet, i, x, y, vx, vy)
-    east, north = poses[i].east, poses[i].north
-    paths[row].east_0, paths[row].north_0 = east, north
+    end_x, end_y, distance = _stop(fleet, i, x, y, vx, vy)
+    paths[row].east_0, paths[row].north_0 = poses[i].east, poses[i].north
     paths[row].east_1, paths[row].north_1 = x, y
     paths[row].east_2, paths[row].north_2 = end_x, end_y
-    paths[row].reach = math.sqrt((x - east) * (x - east) + (y - north) * (y - north)) + math.sqrt(
-        (end_x - x) * (end_x - x) + (end_y - y) * (end_y - y)
-    )
+    intervals = under_way(fleet, i, interval) + (1 if last else 0)
+    paths[row].reach = intervals * interval * paths[i].fastest + distance
 
 
 @inlined_kernel

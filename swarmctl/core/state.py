@@ -76,7 +76,8 @@ WANT = record("v_east", "v_north", "up")
 SETPOINT = record("v_east", "v_north", "up", "outcome", integers=("outcome",))
 
 # The stop path a vehicle owns: here, where it will be after latency and interval, where it then stands;
-# `low` and `high` bound the heights it may pass.  From `anchor_east` on: the vehicle's anchor (core/anchor.py).
+# `low` and `high` bound the heights it may pass, and `reach` (m) is no less than its length.
+# From `anchor_east` on: the vehicle's anchor (core/anchor.py).
 PATH = record(
     "east_0", "north_0", "east_1", "north_1", "east_2", "north_2", "low", "high", "reach", "airborne",
     "anchor_east", "anchor_north", "freedom", "fastest", "hold", "clear", "near",

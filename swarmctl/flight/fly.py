@@ -13,7 +13,7 @@ from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
 from swarmctl.record.folder import RunFolder
-from swarmctl.record.tracks import Picture, draw
+from swarmctl.record.tracks import Picture, draw, subtitle_of
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
 
@@ -172,7 +172,7 @@ def picture(outcome: Outcome) -> Picture:
         fraction=fraction,
         crossings=outcome.summary("")["time_to_s"],
         duration_s=max(outcome.searched_s, 1.0),
-        subtitle=f"{outcome.mission.name}, seed {outcome.seed}",
+        subtitle=subtitle_of(outcome.mission, outcome.seed),
         returns=returns,
     )
 

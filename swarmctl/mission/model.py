@@ -200,6 +200,11 @@ class Targets(Part):
     file: str | None = None
     positions_m: PointsM | None = None
 
+    @property
+    def move(self) -> bool:
+        """Whether they are anywhere else later than where they were laid out."""
+        return self.motion != "static" or self.cluster_motion != "static"
+
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         self.only_one_of("file", "positions_m", required=False)

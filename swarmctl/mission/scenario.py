@@ -72,7 +72,8 @@ class Scenario:
         """The vehicles (V,) VEHICLE, with this seed's initial headings."""
         fleet = self._standing.copy()
         headings = launch.draw_headings(self._opening, len(fleet), seed)
-        if not self.ideal:
+        # Those spread all over the area are not in each other's way, and handing out thousands takes minutes.
+        if not self.ideal and self.mission.launch != "spread":
             headings = launch.uncross(self.starts, headings)
         fleet["heading_east"], fleet["heading_north"] = np.cos(headings), np.sin(headings)
         return fleet

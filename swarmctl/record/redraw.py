@@ -12,7 +12,7 @@ from . import mcap_read, rows
 from .folder import RunFolder
 from .replay import as_now, open_world
 from .summary import time_to
-from .tracks import Picture, draw
+from .tracks import Picture, draw, subtitle_of
 
 
 def redraw(folder: RunFolder) -> Path:
@@ -53,7 +53,7 @@ def redraw(folder: RunFolder) -> Path:
         crossings=time_to(found),
         duration_s=max(ticks * period, 1.0),
         returns=[np.array(p).reshape(-1, 2) for p in homeward],
-        subtitle=f"{mission.name}, seed {int(world.rules[0]['seed'])}",
+        subtitle=subtitle_of(mission, int(world.rules[0]["seed"])),
     )
     draw(folder.tracks, picture)
     return folder.tracks

@@ -17,6 +17,8 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
+from swarmctl.mission.model import Mission
+
 from .drawing import COLOURS, DPI, GREY, GROUND, INK, LIGHT_COLOURS, PALE, Style, new_figure, plain, save
 
 Floats = NDArray[np.float64]
@@ -34,6 +36,7 @@ KILOMETRES_FROM_M = 2000.0
 class Map:
     """What is drawn of a run on the ground.  Positions are metres east and north, shape (n, 2).
 
+    Targets are drawn where they were laid out, also those that move from there (``subtitle_of`` says so).
     ``found`` (T,) tells which of the targets (T, 2) were; ``tracks`` has one track a vehicle.
     """
 
@@ -59,6 +62,12 @@ class Picture(Map):
     crossings: Mapping[str, float | None]
     duration_s: float
     subtitle: str = ""
+
+
+def subtitle_of(mission: Mission, seed: int) -> str:
+    """Which run a picture is of, and how its targets are to be read."""
+    moving = "; targets move, drawn where they started" if mission.targets.move else ""
+    return f"{mission.name}, seed {seed}{moving}"
 
 
 def draw(path: Path, picture: Picture) -> None:

@@ -158,8 +158,8 @@ def _draw_heat(panel: Axes, measure: Measure, values: Floats, up: Axis, across: 
     shades = "viridis_r" if measure.least_is_best else "viridis"
     image = panel.imshow(values, cmap=shades, aspect="auto", origin="lower")
     labels = [shown_value(value) for value in across.values]
-    turned = 30 if max(map(len, labels)) > LONG_LABEL else 0
-    panel.set_xticks(range(len(labels)), labels, rotation=turned, ha="right" if turned else "center")
+    upright = max(map(len, labels)) > LONG_LABEL
+    panel.set_xticks(range(len(labels)), labels, rotation=90 if upright else 0)
     panel.set_yticks(range(len(up.values)), [shown_value(value) for value in up.values])
     panel.set_xlabel(across.key, color=GREY)
     panel.set_ylabel(up.key, color=GREY)

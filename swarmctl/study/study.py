@@ -85,16 +85,29 @@ class Study:
 
     def warm_up(self, compiling: Callable[[str], None] = lambda name: None) -> None:
         """Compile, or load, what the runs will call; ``compiling`` is told of each algorithm that takes long."""
+        for job in self._first_steps():
+            if not bind.is_compiled(job.algorithm, "run_ideal" if job.ideal else "run_multicopter"):
+                compiling(job.algorithm)
+            simulate(job)
+
+    def warm_up_elsewhere(self, executor: Executor) -> None:
+        """Have it compiled by the workers of a cluster: as many jobs of each kind as they have threads."""
+        for job in self._first_steps():
+            for future in [executor.submit(simulate, job) for _ in range(threads_of(executor))]:
+                future.result()
+
+    def _first_steps(self) -> list[Job]:
+        """A run of a single step for each kind of run that has kernels of its own."""
         kinds = {
             (name, is_ideal(mission), mission.observations): mission
             for cell in self.plan.cells
             for name, mission in cell.missions.items()
         }
-        for (name, ideal, _), mission in kinds.items():
-            if not bind.is_compiled(name, "run_ideal" if ideal else "run_multicopter"):
-                compiling(name)
-            short = mission.model_copy(update={"duration_s": mission.planner.period_s})
-            simulate(Job(short, name, (self.plan.seeds[0],), ideal))
+        seeds = (self.plan.seeds[0],)
+        return [
+            Job(mission.model_copy(update={"duration_s": mission.planner.period_s}), name, seeds, ideal)
+            for (name, ideal, _), mission in kinds.items()
+        ]
 
     def fly(
         self, executor: Executor, wall_s: Callable[[], float], done: Done = lambda runs: None,

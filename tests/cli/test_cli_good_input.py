@@ -109,7 +109,7 @@ def test_report_draws_the_picture_anew(swarmctl: Swarmctl, flown: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [None, "paper", "paper.yaml", "missions/field.yaml", "lake", "mixed", "sitl"]
+    "name", [None, "paper", "paper.yaml", "missions/field.yaml", "lake", "mixed", "sitl", "fleet", "drifting"]
 )
 def test_check_says_what_a_mission_is(swarmctl: Swarmctl, name: str | None) -> None:
     result = swarmctl("check", *(("--mission", name) if name else ()))

@@ -118,6 +118,23 @@ def test_ideal_vehicles_start_together_on_the_border_and_drawn_headings_are_kept
     assert scenario.fences.plan[:, 0].max() == 5000.0
 
 
+@pytest.mark.parametrize("ideal", [True, False])
+def test_spread_vehicles_start_all_over_the_area_on_any_heading_as_drawn(ideal: bool) -> None:
+    scenario = Scenario(paper(vehicles__count=300, vehicles__launch="spread"), ideal=ideal)
+    world = scenario.world(5)
+    assert world.poses["east"].tolist() == scenario.starts[:, 0].tolist()
+    assert np.ptp(scenario.starts, axis=0).min() > 4500.0
+    drawn = launch.draw_headings((0.0, 2.0 * np.pi), 300, 5)
+    assert np.cos(headings_of(world) - drawn) == pytest.approx(1.0)
+    assert np.histogram(drawn, 4, (0.0, 2.0 * np.pi))[0].min() > 50
+
+
+def test_pads_that_the_mission_names_are_those_of_ideal_vehicles_too() -> None:
+    pads = [[100.0, 200.0], [400.0, 300.0]]
+    scenario = Scenario(paper(vehicles__count=2, vehicles__launch=pads), ideal=True)
+    assert scenario.starts.tolist() == pads
+
+
 def test_a_multicopters_fences_have_their_margins() -> None:
     fences = Scenario(paper(), ideal=False).fences
     assert (fences.raw[:, 0].max(), fences.plan[:, 0].max(), fences.guard[:, 0].max()) == (5000, 4980, 4990)
@@ -161,6 +178,25 @@ def test_targets_are_legal_numerous_and_in_their_clusters() -> None:
         assert len(targets) == 450
         assert shapely.intersects_xy(area, targets["east"], targets["north"]).all()
         assert set(targets["cluster"].tolist()) == set(range(6))
+
+
+def test_targets_move_as_the_mission_says_and_start_from_the_layout_that_stands_still() -> None:
+    still = Scenario(paper(), ideal=True).scene(3)
+    moves = {"targets__motion": "wander", "targets__wander_mps": 0.5}
+    wander = Scenario(paper(**moves), ideal=True).scene(3)
+    drift = Scenario(paper(targets__cluster_motion="drift", targets__cluster_mps=2.0), ideal=True).scene(3)
+    assert still.targets.tobytes() == wander.targets.tobytes() == drift.targets.tobytes()
+    assert (still.grid[0]["stray"], still.grid[0]["drift_speed"], len(still.grid)) == (0.0, 0.0, 1)
+    assert wander.grid[["seed", "wander", "wander_speed", "drift_speed"]].tolist() == [(3, 45.0, 0.5, 0.0)]
+    assert drift.grid[["seed", "wander", "drift_speed"]].tolist() == [(3, 0.0, 2.0)] * 6
+    assert 300.0 < drift.grid["ahead"].max() <= 600.0
+
+
+def test_targets_of_a_file_drift_together() -> None:
+    lake = load("lake", {"targets.cluster_motion": "drift"})
+    grid = Scenario(lake, ideal=True).scene(1).grid
+    assert len(grid) == 1
+    assert grid[0]["drift_speed"] == 1.5
 
 
 def test_targets_of_a_file_are_those_targets_whatever_the_seed() -> None:

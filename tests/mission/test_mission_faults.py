@@ -74,6 +74,13 @@ Complaints = Callable[..., list[str]]
             "sensor: {detection_probability: 1.1}",
             "m.yaml:1:10: sensor.detection_probability: must be less than or equal to 1",
         ),
+        ("targets: {motion: fly}", "m.yaml:1:11: targets.motion: must be 'static' or 'wander', not 'fly'"),
+        (
+            "targets: {cluster_motion: wander}",
+            "m.yaml:1:11: targets.cluster_motion: must be 'static' or 'drift', not 'wander'",
+        ),
+        ("targets: {wander_mps: 0}", "m.yaml:1:11: targets.wander_mps: must be greater than 0, not 0"),
+        ("targets: {cluster_mps: 31}", "m.yaml:1:11: targets.cluster_mps: must be less than or equal to 30"),
         ("radio: {loss: -0.1}", "m.yaml:1:9: radio.loss: must be greater than or equal to 0"),
         ("name: 5", "m.yaml:1:1: name: must be text, not 5 (put it in quotes)"),
         (

@@ -20,7 +20,8 @@ Read = Callable[..., Mission]
 
 
 def test_every_packaged_mission_loads() -> None:
-    assert {"paper", "sitl", "field", "lake", "mixed"} <= set(packaged())
+    some = {"paper", "sitl", "field", "lake", "mixed", "wandering", "drifting", "fleet"}
+    assert some <= set(packaged())
     for name in packaged():
         assert load(name).name == name
 
@@ -40,6 +41,22 @@ def test_the_default_is_the_reference_scenario(small_catalogue: None) -> None:
 def test_the_paper_writes_out_the_defaults(small_catalogue: None) -> None:
     plain = Mission(name="paper", keep_out=load("paper").keep_out)
     assert load("paper") == plain
+
+
+@pytest.mark.parametrize("name", ["wandering", "drifting", "fleet"])
+def test_those_studied_beside_the_reference_differ_from_it_in_one_section(
+    name: str, small_catalogue: None
+) -> None:
+    mission, paper = load(name), load("paper")
+    section = "vehicles" if name == "fleet" else "targets"
+    assert getattr(mission, section) != getattr(paper, section)
+    same = {"name": "paper", section: getattr(paper, section)}
+    assert mission.model_copy(update=same) == paper
+
+
+def test_the_mixed_fleet_sweeps_as_much_ground_as_the_reference(small_catalogue: None) -> None:
+    swept = [sum(v.speed_mps * v.sensor.range_m for v in load(name).fleet) for name in ("fleet", "paper")]
+    assert swept[0] == pytest.approx(swept[1], rel=0.01)
 
 
 def test_sitl_vehicles_stand_inside(small_catalogue: None) -> None:

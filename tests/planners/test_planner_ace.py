@@ -67,6 +67,15 @@ def test_the_next_lane_runs_the_other_way_one_spacing_on(spacing: float, speed: 
     assert before[1] - FAR[1] == pytest.approx(spacing)
 
 
+def test_lanes_are_no_further_apart_than_each_vehicle_sees() -> None:
+    there = (2000.0, 0.0)
+    targets = [*crowd(HERE, 2), *crowd(there, 2)]
+    s = Situation("ace", [HERE, there], [90.0, 90.0], targets, spacing_m=300.0)
+    s.world.fleet["sensor_range"] = [100.0, 200.0]
+    s.plan().put(0, FAR).put(1, (2000.0, 5000.0)).plan(4)
+    assert [s.remembers("shift_left", i) for i in (0, 1)] == [200.0, 300.0]
+
+
 def test_lanes_shift_the_same_way_every_time() -> None:
     s = mowing()
     s.put(0, FAR).plan(4)

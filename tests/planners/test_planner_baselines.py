@@ -155,6 +155,14 @@ def test_sweep_gives_each_vehicle_its_own_strip() -> None:
     assert tracks[:, 0].max() < 1000.0 < tracks[:, 1].min()
 
 
+def test_sweep_strips_are_as_wide_as_vehicles_are_fast_and_see() -> None:
+    s = Situation("sweep", [(5.0, 5.0)] * 3, [45.0] * 3, area=SWEPT)
+    s.world.fleet["speed"], s.world.fleet["sensor_range"] = [30.0, 10.0, 20.0], [100.0, 200.0, 250.0]
+    s.world.prepare()
+    assert [s.remembers("west", i) for i in range(3)] == pytest.approx([0.0, 600.0, 1000.0])
+    assert [s.remembers("width", i) for i in range(3)] == pytest.approx([600.0, 400.0, 1000.0])
+
+
 def test_sweep_passes_a_keep_out_and_rejoins_its_lane() -> None:
     keep_outs = [(950.0, 1010.0, 700.0, 900.0)]
     s = Situation("sweep", [(980.0, 300.0)], [90.0], area=(900.0, 1100.0, 0.0, 1600.0), keep_outs=keep_outs)

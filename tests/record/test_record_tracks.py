@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from swarmctl.mission.load import load
 from swarmctl.record import tracks
 from swarmctl.record.errors import RunFolderError
 from swarmctl.record.summary import time_to
@@ -210,3 +211,12 @@ def test_title_panels_and_legend_keep_clear_of_each_other(
         assert figure.bbox.fully_contains(part.x1, part.y1)
         assert not any(part.overlaps(other) for other in parts[:number])
     assert max(part.x1 for part in parts) > 0.97 * figure.bbox.width
+
+
+def test_the_picture_says_when_targets_move() -> None:
+    still, drifting, wandering = (
+        tracks.subtitle_of(load(name), 3) for name in ("paper", "drifting", "wandering")
+    )
+    assert still == "paper, seed 3"
+    assert drifting == "drifting, seed 3; targets move, drawn where they started"
+    assert "targets move" in wandering

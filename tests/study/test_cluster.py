@@ -15,8 +15,10 @@ from pathlib import Path
 import llvmlite.binding
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from distributed import Client
 
+from swarmctl.cli import main
 from swarmctl.core.arrays import Records
 from swarmctl.mission.load import load
 from swarmctl.study import cluster as clusters
@@ -27,6 +29,7 @@ from swarmctl.study.errors import ClusterError
 ROOT = Path(__file__).parents[2]
 PATIENCE_S = 60.0
 RUNS = range(1, 241)
+OF_THE_MACHINE = ("wall_s", "uav_steps_per_s", "threads", "run", "machine")
 
 
 def until(met: Callable[[], bool]) -> None:
@@ -115,6 +118,24 @@ def test_a_worker_killed_in_mid_study_changes_no_bit(address: str) -> None:
         assert lost
         assert list(client.nthreads()) == [address_of(client, "stays")]
     assert there.tobytes() == here.tobytes()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("study", "--algo", "fco", "--runs", "20"), ("tune", "--algo", "fco", "--trials", "3", "--runs", "8")],
+)
+def test_commands_come_to_the_same_on_a_cluster(
+    command: tuple[str, ...], address: str, tmp_path: Path
+) -> None:
+    def told(*options: str) -> dict[str, object]:
+        result = CliRunner().invoke(main, [*command, "--json", *options])
+        assert result.exit_code == 0, result.stderr
+        content = json.loads(result.stdout)
+        return {key: value for key, value in content.items() if key not in OF_THE_MACHINE}
+
+    with worker(address, "only"):
+        there = told("--cluster", address, "--out", str(tmp_path / "there"))
+    assert there == told("--workers", "2", "--out", str(tmp_path / "here"))
 
 
 def test_a_scheduler_that_dies_in_mid_study_is_an_error_and_no_waiting(tmp_path: Path) -> None:

@@ -178,7 +178,7 @@ GRIDS = {
     "numbers": ["planner.inertia=0,0.2,0.4", "planner.random=0,0.1"],
     "many": ["planner.inertia=" + ",".join(f"{k / 20:g}" for k in range(20)), "planner.random=0,0.1"],
     "words": ["dynamics=ideal,multicopter", "planner.terms=unit,metric"],
-    "lists": ["stub.wind_mps=[0, 0],[10.5, -3.25],[3, 4]", "vehicles.count=3,4"],
+    "lists": ["stub.wind_mps=" + ",".join(f"[1{k}.25, -1{k}.25]" for k in range(6)), "vehicles.count=3,4"],
     "three keys": ["planner.inertia=0,0.2", "planner.random=0,0.1", "radio.range_m=0,600"],
 }
 

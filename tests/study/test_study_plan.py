@@ -54,6 +54,16 @@ def test_every_algorithm_s_own_parameters_can_be_set(algorithm: str) -> None:
         }
 
 
+def test_one_vehicle_s_speed_and_every_sensor_can_be_set() -> None:
+    sets = ["vehicles.0.speed_mps=5,10", "vehicles.sensor.range_m=77"]
+    plan = make_plan(Path("fleet"), ["fco"], SEEDS, {}, sets)
+    fleets = [Scenario(cell.mission, ideal=True).fleet(1) for cell in plan.cells]
+    assert [fleet["speed"].tolist() for fleet in fleets] == [
+        [5, 30, 15, 15, 25, 25], [10, 30, 15, 15, 25, 25],
+    ]  # fmt: skip
+    assert all((fleet["sensor_range"] == 77).all() for fleet in fleets)
+
+
 def test_every_algorithm_meets_the_same_layouts() -> None:
     (cell,) = make_plan(None, list(planners.MODULES), SEEDS, {}, []).cells
     for seed in SEEDS:

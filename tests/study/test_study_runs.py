@@ -158,3 +158,16 @@ def test_warming_up_tells_what_has_to_be_compiled(monkeypatch: pytest.MonkeyPatc
         ("bounce", True, 1.0, (1,)),
         ("fco", True, 1.0, (1,)),
     ]  # a step each, whatever the settings
+
+
+def test_workers_elsewhere_are_warmed_up_once_a_thread() -> None:
+    class Elsewhere(LastFirst):
+        threads = 3
+
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            submitted.append((args[0].algorithm, args[0].mission.duration_s))
+            return super().submit(fn, *args, **kwargs)
+
+    submitted: list[tuple[str, float]] = []
+    Study(small_plan(ALGORITHMS, RUNS)).warm_up_elsewhere(Elsewhere())
+    assert submitted == [("bounce", 1.0)] * 3 + [("fco", 1.0)] * 3

@@ -127,6 +127,18 @@ def test_where_all_get_there_the_p_is_scipy_s(pairs: list[tuple[int, int]]) -> N
     assert compare(a, b).p == pytest.approx(wanted)
 
 
+@given(st.lists(st.tuples(times, times), min_size=14, max_size=40))
+def test_with_runs_that_never_got_there_the_p_is_scipy_s_of_a_time_beyond_all(
+    pairs: list[tuple[float, float]],
+) -> None:
+    a, b = (np.array(side) for side in zip(*pairs, strict=True))
+    neither = np.isinf(a) & np.isinf(b)
+    told = np.clip(np.where(neither, 0.0, np.where(neither, 0.0, a) - np.where(neither, 0.0, b)), -1e9, 1e9)
+    told = told[told != 0]
+    assume(len(told) > FEW)
+    assert compare(a, b).p == pytest.approx(float(stats.wilcoxon(told).pvalue))
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(-9, 9).filter(bool), min_size=1, max_size=8))
 def test_of_few_pairs_the_p_counts_all_signings(differences: list[int]) -> None:

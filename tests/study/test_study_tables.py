@@ -55,25 +55,14 @@ def test_the_tables_say_what_there_is(told: CellFigures) -> None:
     assert ["fco", "before", "bounce", "100.0", "%", "43.9", "-", "100.0", "%", "0", "-", "0.250"] in said
 
 
-def test_a_pair_is_told_from_the_side_of_who_is_earlier() -> None:
+@pytest.mark.parametrize(
+    ("fco_s", "bounce_s", "first"), [(100, 70, "bounce before fco"), (70, 100, "fco before bounce")]
+)
+def test_a_pair_is_told_from_the_side_of_who_is_earlier(fco_s: float, bounce_s: float, first: str) -> None:
     plan = small_plan(("fco", "bounce"), 2)
-    slow, fast = records([[100.0] * 5] * 2), records([[70.0] * 5] * 2)
-    said = lines(tables.render(tables.of_cell(cell_of(plan, {"fco": slow, "bounce": fast}), 2)))
-    assert [
-        "bounce",
-        "before",
-        "fco",
-        "100.0",
-        "%",
-        "34.2",
-        "-",
-        "100.0",
-        "%",
-        "0",
-        "30",
-        "s",
-        "0.500",
-    ] in said
+    runs = {"fco": records([[fco_s] * 5] * 2), "bounce": records([[bounce_s] * 5] * 2)}
+    said = lines(tables.render(tables.of_cell(cell_of(plan, runs), 2)))
+    assert f"{first} 100.0 % 34.2 - 100.0 % 0 30 s 0.500".split() in said
 
 
 def test_one_algorithm_has_no_pairs(told: CellFigures) -> None:

@@ -145,6 +145,17 @@ def test_a_lead_that_was_luck_is_said_to_be_none(
     assert "NOT better" in got.verdict
 
 
+@pytest.mark.parametrize(("lead_s", "better"), [(20.0, False), (100.0, True), (-100.0, False)])
+def test_a_lead_counts_if_chance_would_hardly_have_it(
+    lead_s: float, better: bool, valley: Valley, tmp_path: Path, executor: Executor
+) -> None:
+    trials = trials_of(question(), tmp_path / "t.db", 1, executor)
+    luck = np.random.default_rng(2).normal(0.0, 200.0, 100)
+    default = np.full(100, 600.0)
+    best = default - lead_s + luck - luck.mean()  # so that the means differ by just that
+    assert Answer(trials, range(100), default, best).is_better is better
+
+
 def test_a_default_that_nothing_beats_is_kept(valley: Valley, tmp_path: Path, executor: Executor) -> None:
     valley.depth = 0.0
     got = tuned(question(), tmp_path / "t.db", 5, executor)

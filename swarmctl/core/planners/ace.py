@@ -1,8 +1,9 @@
 """ACE, accurate coverage exploration (Wang et al. 2019, section VI): mow every cluster on line.
 
 The first target of a cluster starts lanes perpendicular to the heading it was found on.  A lane ends some steps
-after its last hit (α), the next one lies a spacing further along the old heading and runs back; a lane with no
-hit at all (β) ends the cluster.  Of two vehicles that mow one cluster and hear each other, the one that has
+after its last hit (α), the next one lies a spacing further along the old heading and runs back (no further than the
+vehicle sees to both sides, or there would be ground between that nobody saw); a lane with no hit at all (β) ends the
+cluster.  Of two vehicles that mow one cluster and hear each other, the one that has
 found fewer there leaves with a random turn.
 """
 
@@ -30,7 +31,12 @@ PARAMETERS = (
         "beta_s", 10.0, "β, a lane without a hit for so long ends the cluster", "eq. 13", search=(1.0, 30.0)
     ),
     Parameter(
-        "spacing_m", 300.0, "distance of the lanes", "ours: the paper gives none", 1.0, search=(50.0, 600.0)
+        "spacing_m",
+        300.0,
+        "distance of the lanes, at most twice the sensor's range",
+        "ours: the paper gives none",
+        1.0,
+        search=(50.0, 600.0),
     ),
     Parameter(
         "random", 1.0, "φ, size of the random turn on leaving", "Algorithm 3, line 19", 0.0, 100.0, (0.0, 2.0)
@@ -68,20 +74,20 @@ def _begin_mowing(memory: Records, i: int, rules: Records, tick: int) -> None:
 
 
 @kernel
-def _end_lane(memory: Records, i: int, settings: Records) -> None:
+def _end_lane(memory: Records, i: int, fleet: Records, settings: Records) -> None:
     """A lane with hits is followed by the next one; a lane without ends the cluster."""
     if memory[i].hits == 0:
         memory[i].mode = LEAVING
         return
     memory[i].mode = SHIFT
-    memory[i].shift_left = settings[0].spacing_m
+    memory[i].shift_left = min(settings[0].spacing_m, 2.0 * fleet[i].sensor_range)
 
 
 @kernel
-def _mow(memory: Records, i: int, in_range: int, travel: float, period: float, settings: Records) -> None:
+def _mow(memory: Records, i: int, fleet: Records, in_range: int, period: float, settings: Records) -> None:
     """One period on a lane or between two."""
     if memory[i].mode == SHIFT:
-        memory[i].shift_left -= travel
+        memory[i].shift_left -= fleet[i].speed * period
         if memory[i].shift_left <= 0.0:
             _begin_lane(memory, i, -memory[i].lane_east, -memory[i].lane_north)
         return
@@ -91,7 +97,7 @@ def _mow(memory: Records, i: int, in_range: int, travel: float, period: float, s
         memory[i].since_hit = 0.0
     patience = settings[0].alpha_s if memory[i].hits > 0 else settings[0].beta_s
     if memory[i].since_hit >= patience:
-        _end_lane(memory, i, settings)
+        _end_lane(memory, i, fleet, settings)
 
 
 @kernel
@@ -138,7 +144,7 @@ def step(
                 memory[i].heading_north + phi * normal(rules[0].seed, i, tick, CHOICE + 2),
             )  # fmt: skip
         else:
-            _mow(memory, i, in_range, fleet[i].speed * rules[0].period, rules[0].period, settings)
+            _mow(memory, i, fleet, in_range, rules[0].period, settings)
             _set_heading(memory, i)
     _meet_fence(memory, i, fleet, poses, edges, rules, settings, tick)
 
@@ -151,7 +157,7 @@ def _meet_fence(
     """A lane that meets the fence ends there; a shift that meets it ends the cluster."""
     reach = common.look_ahead(fleet, i, rules)
     if memory[i].mode == LANE and common.blocked(memory, i, poses, edges, reach):
-        _end_lane(memory, i, settings)
+        _end_lane(memory, i, fleet, settings)
         _set_heading(memory, i)
     met = common.respond_to_fence(memory, i, poses, fleet, edges, rules, tick, settings[0].inertia)
     if met and memory[i].mode != SEARCHING:

@@ -29,10 +29,10 @@ PARAMETERS = (
         "inertia", 0.4, "w in the fence response", "Algorithm 1, line 27", 0.0, 100.0,
         search=(0.0, 1.0),
     ),
-    Parameter("cell", 0.625, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
+    Parameter("cell", 0.75, "width of a cell, in sensor ranges", "ours", 0.05, 1.5),
     Parameter("cell_most", 1.5, "width of a cell where the area is large, in sensor ranges", "ours", 0.05, 10.0),
     Parameter(
-        "visited", 0.9, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0,
+        "visited", 1.0, "a cell is visited within so many sensor ranges of its centre", "ours", 0.0, 10.0,
         search=(0.5, 1.5),
     ),
     Parameter(
@@ -60,7 +60,7 @@ PARAMETERS = (
         search=(0.0, 1.0),
     ),
     Parameter(
-        "seen_s", 60.0, "another vehicle counts for so long after it was heard of", "ours",
+        "seen_s", 120.0, "another vehicle counts for so long after it was heard of", "ours",
         search=(0.0, 300.0),
     ),
     Parameter(
@@ -73,7 +73,7 @@ PARAMETERS = (
         "then", "hold", "when little is left: search all over again, or converge on the densest known spot", "ours",
         choices=("hold", "converge"),
     ),
-    Parameter("enough", 0.05, "with converge: little is left where no cell is worth so much a second", "ours"),
+    Parameter("enough", 0.03, "with converge: little is left where no cell is worth so much a second", "ours"),
     Parameter("patience", 3.0, "a goal is given up after so many times its straight flight", "ours", 1.0),
 )  # fmt: skip
 SETTLE_S = 30.0  # and so much on top, for short ways
@@ -99,13 +99,8 @@ LONG_AGO = -1e9
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
     """Agree on the sectors; cells are laid at the first step, where the settings are at hand."""
     sectors.agree(memory, i, fleet, edges)
-    memory[i].mode, memory[i].laid, memory[i].goal_row, memory[i].lap, memory[i].counted = (
-        FIRST_LEG,
-        0,
-        -1,
-        0,
-        0,
-    )
+    memory[i].mode, memory[i].laid, memory[i].lap = FIRST_LEG, 0, 0
+    memory[i].goal_row, memory[i].goal_column, memory[i].counted = -1, -1, 0
     memory[i].decide_at, memory[i].give_up_at, memory[i].side = 0.0, 0.0, 0.0
     for k in range(choice.MET):
         memory[i].met_at[k] = LONG_AGO
@@ -247,12 +242,8 @@ def _decide(
     ``fresh``: what became of the last goal is no reason to give this one less time.
     """
     if not fresh and now > memory[i].give_up_at:
-        grid.give_up(
-            memory,
-            i,
-            memory[i].goal_row - memory[i].first_row,
-            memory[i].goal_column - memory[i].first_column,
-        )
+        row, column = memory[i].goal_row - memory[i].first_row, memory[i].goal_column - memory[i].first_column
+        grid.give_up(memory, i, row, column)
         fresh = True
     row, column = grid.row_at(memory, i, poses[i].north), grid.column_at(memory, i, poses[i].east)
     if _goal_is_open(memory, i):
@@ -336,11 +327,9 @@ def tell(memory: Records, i: int, beacons: Records, slot: int) -> None:
     beacons[slot, i].lap = memory[i].lap
     beacons[slot, i].first_column = memory[i].first_column
     beacons[slot, i].first_row = memory[i].first_row
-    for row in range(grid.SIDE):
+    for row in range(grid.rows_of(memory, i)):
         beacons[slot, i].visited[row] = memory[i].visited[row]
     for k in range(choice.MET):
         beacons[slot, i].met[k], beacons[slot, i].met_at[k] = memory[i].met[k], memory[i].met_at[k]
-        beacons[slot, i].met_east[k], beacons[slot, i].met_north[k] = (
-            memory[i].met_east[k],
-            memory[i].met_north[k],
-        )
+        beacons[slot, i].met_east[k] = memory[i].met_east[k]
+        beacons[slot, i].met_north[k] = memory[i].met_north[k]

@@ -99,9 +99,10 @@ def lay_cells(memory: Records, i: int, fleet: Records, edges: Floats, share: flo
         reach = min(reach, fleet[j].sensor_range)
     size = max(east - west, north - south)
     cell = min(max(share * reach, size / SIDE), most * reach)
-    memory[i].cell, memory[i].west, memory[i].south = cell, west, south
-    memory[i].columns = max(math.ceil((east - west) / cell - 1e-9), 1)
-    memory[i].rows = max(math.ceil((north - south) / cell - 1e-9), 1)
+    columns, rows = max(round((east - west) / cell), 1), max(round((north - south) / cell), 1)
+    memory[i].cell, memory[i].columns, memory[i].rows = cell, columns, rows
+    memory[i].west = 0.5 * (west + east - columns * cell)
+    memory[i].south = 0.5 * (south + north - rows * cell)
 
 
 @kernel
@@ -272,5 +273,6 @@ def take_over(memory: Records, i: int, beacons: Records, slot: int, j: int) -> N
     """Mark what vehicle ``j`` says was visited, as far as the two windows overlap."""
     across = beacons[slot, j].first_column - memory[i].first_column
     up = beacons[slot, j].first_row - memory[i].first_row
-    for row in range(max(up, 0), min(SIDE + up, SIDE)):
+    rows = rows_of(memory, i)
+    for row in range(max(up, 0), min(rows + up, rows)):
         visit_row(memory, i, row, _shifted(beacons[slot, j].visited[row - up], across))

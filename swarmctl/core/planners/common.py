@@ -38,6 +38,12 @@ def scale(rules: Records, fleet: Records, i: int) -> float:
 
 
 @kernel
+def sweep_rate(fleet: Records, i: int) -> float:
+    """How fast (m²/s) a vehicle's sensor sweeps the ground to one side: its share of what is divided at launch."""
+    return float(fleet[i].speed * fleet[i].sensor_range)
+
+
+@kernel
 def turn_to(memory: Records, i: int, x: float, y: float) -> None:
     """Make (x, y), of any size but zero, the commanded direction."""
     size = math.sqrt(x * x + y * y)

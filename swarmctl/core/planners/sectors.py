@@ -13,6 +13,7 @@ import math
 
 from ..arrays import Floats, Records
 from ..jit import kernel
+from . import common
 
 TURN = 2.0 * math.pi
 PROBES = 72  # wedges in which an empty one is looked for, to begin to count at
@@ -106,9 +107,9 @@ def _shares(fleet: Records, i: int, first: float) -> tuple[float, float]:
     """Vehicle ``i``'s share of the area from which to which, in the order of the initial headings from ``first``."""
     first_x, first_y = math.cos(first), math.sin(first)
     mine = _order(fleet[i].heading_east, fleet[i].heading_north, first_x, first_y)
-    before, own, whole = 0.0, fleet[i].speed * fleet[i].sensor_range, 0.0
+    before, own, whole = 0.0, common.sweep_rate(fleet, i), 0.0
     for j in range(fleet.shape[0]):
-        weight = fleet[j].speed * fleet[j].sensor_range
+        weight = common.sweep_rate(fleet, j)
         other = _order(fleet[j].heading_east, fleet[j].heading_north, first_x, first_y)
         whole += weight
         if other < mine or (other == mine and j < i):

@@ -1,9 +1,9 @@
 """Sweep, the baseline every search team knows: parallel lanes, a strip of the area for each vehicle.
 
-The strips are agreed at launch by vehicle number: equal widths from west to east of the area's bounding box,
-lanes run north and south and end where the area does.  A keep-out is passed on whichever side turns least, and
-the lane rejoined behind it.  The lanes are flown to and fro until the search ends; neither detections nor the
-radio are used.
+The strips are agreed at launch by vehicle number, from west to east of the area's bounding box, each as wide as its
+vehicle's speed and sensor make it; lanes run north and south and end where the area does.  A keep-out is passed on
+whichever side turns least, and the lane rejoined behind it.  The lanes are flown to and fro until the search ends;
+neither detections nor the radio are used.
 """
 
 import math
@@ -39,12 +39,17 @@ MEMORY = record(
 
 @kernel
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
-    """Agree on the strips: the bounding box cut into as many as there are vehicles."""
+    """Agree on the strips: the bounding box cut into as many as there are vehicles, all swept in the same time."""
     west, east = math.inf, -math.inf
     for k in range(edges.shape[0]):
         west, east = min(west, edges[k, 0]), max(east, edges[k, 0])
-    memory[i].width = (east - west) / fleet.shape[0]
-    memory[i].west = west + i * memory[i].width
+    before, whole = 0.0, 0.0
+    for j in range(fleet.shape[0]):
+        if j == i:
+            before = whole
+        whole += common.sweep_rate(fleet, j)
+    memory[i].width = (east - west) * common.sweep_rate(fleet, i) / whole
+    memory[i].west = west + (east - west) * before / whole
     memory[i].lanes = 0  # laid out at the first step, where the settings are at hand
     memory[i].order = 1
 
