@@ -37,9 +37,9 @@ def steer(
     """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
     for i in range(fleet.shape[0]):
         anchor.settle(fleet, i, poses, rules, guard_edges, paths)
-    shown = _anybody_returns(errands)  # who looks at everybody's paths
+    shown = _anybody_returns(errands)  # who looks at everybody's paths; else only neighbours do
     for i in range(fleet.shape[0]):
-        if shown or not guard.free(paths, i):
+        if shown or paths[i].near != 0:
             airborne = stages.airborne(errands[i].stage)
             up = _wanted_up(fleet, errands, poses, i)
             guard.own_path(fleet, i, poses, sent, rules[0].interval, up, airborne, paths)

@@ -291,7 +291,7 @@ class Swarm:
             )
 
     def _anybody_searches(self) -> bool:
-        return bool(np.isin(self._world.errands["stage"], SEARCHING).any())
+        return any(stage in SEARCHING for stage in self._world.errands["stage"].tolist())
 
     def _await_ready(self, now: float) -> None:
         """Take off when the preparation is over.  Raises RefusedError if it refuses one that is needed."""

@@ -156,6 +156,12 @@ def _separation(mission: Mission) -> Iterator[Finding]:
         yield Finding(points[k][0], message, "put them further apart")
 
 
+def _observations(mission: Mission) -> Iterator[Finding]:
+    if mission.observations == "wire" and mission.dynamics == "ideal":
+        message = "ideal points send no messages that could round what is seen"
+        yield Finding(("observations",), message, "leave dynamics out, or say multicopter")
+
+
 def _too_near(points: Floats, limit: float) -> Iterator[tuple[int, int, float]]:
     """Points whose nearest neighbour is nearer than ``limit``: the later, the earlier, their distance."""
     if len(points) < 2:
@@ -244,6 +250,7 @@ CHECKS = (
     Check(_placing, (*GROUND, *PADS, ("safety", "separation_m"))),
     Check(_fleet, (("vehicles", "launch"), ("vehicles", "count"))),
     Check(_separation, (*PADS, ("dynamics",), ("safety", "separation_m"))),
+    Check(_observations, (("observations",), ("dynamics",))),
     Check(_minimum, (("safety", "minimum_vehicles"), ("vehicles", "count"))),
     Check(_targets, (("origin",), ("area",), ("targets",))),
     Check(_period, (("planner", "period_s"), ("setpoints", "rate_hz"))),

@@ -140,7 +140,8 @@ def draw_times(evidence: Evidence, names: Sequence[str], file: Path) -> None:
             chart.bar(place, mean, 0.9 * width, color=colour_of(name), label=label, zorder=2)
             chart.errorbar(place, mean, std, color=INK, linewidth=1.1, capsize=3, zorder=3)
             if summary.missing:
-                style: Style = {"ha": "center", "va": "bottom", "fontsize": 8.5, "color": INK}
+                plate = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
+                style: Style = {"ha": "center", "va": "bottom", "fontsize": 8.5, "color": INK, "bbox": plate}
                 chart.annotate(
                     f"{summary.missing}", (place, mean + std), (0, 3), textcoords="offset points", **style
                 )
@@ -151,7 +152,7 @@ def draw_times(evidence: Evidence, names: Sequence[str], file: Path) -> None:
     chart.set_title(note, fontsize=10, color=GREY, loc="left", pad=8)
     chart.grid(axis="y", color=PALE, linewidth=0.6)
     chart.set_axisbelow(True)
-    plate: Style = {"facecolor": "white", "edgecolor": "none", "framealpha": 1.0}
-    chart.legend(loc="upper left", fontsize=10, labelcolor=INK, ncols=2, **plate)
+    ground: Style = {"facecolor": "white", "edgecolor": "none", "framealpha": 1.0}
+    chart.legend(loc="upper left", fontsize=10, labelcolor=INK, ncols=2, **ground)
     plain(chart)
     save(figure, file)

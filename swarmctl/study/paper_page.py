@@ -39,7 +39,7 @@ th { color: var(--grey); font-weight: 600; } tr.printed td { color: var(--grey);
 .claim { border-top: 1px solid var(--pale); padding: .6rem 0 .8rem; break-inside: avoid; }
 .claim p.statement { font-size: 1.05rem; margin: .2rem 0; }
 details { margin: .3rem 0; } summary { cursor: pointer; color: #0a5b8f; font-size: .9rem; }
-@media print { body { max-width: none; font-size: 11px; } details > * { display: block; } a { color: inherit; } }
+@media print { body { max-width: none; font-size: 11px; } a { color: inherit; } }
 """
 
 CLASS = {

@@ -51,8 +51,13 @@ class Job:
 
 
 def is_ideal(mission: Mission) -> bool:
-    """Whether a study of this mission is in ideal dynamics: it is, unless the mission says multicopter."""
-    return mission.dynamics != "multicopter"
+    """Whether a study of this mission is in ideal dynamics: it is, unless the mission says multicopter.
+
+    Or unless it says ``observations: wire`` and nothing of dynamics: messages are a multicopter's.
+    """
+    if mission.dynamics is None:
+        return mission.observations == "exact"
+    return mission.dynamics == "ideal"
 
 
 def curve_times(duration_s: float) -> Floats:

@@ -96,6 +96,10 @@ Complaints = Callable[..., list[str]]
             "planner: {parameters: {belief: {then: 3}}}",
             "m.yaml:1:33: planner.parameters.belief.then: must be text, not 3",
         ),
+        (
+            "planner: {parameters: {belief: {then: hover}}}",
+            "m.yaml:1:33: planner.parameters.belief.then: must be hold or converge, not 'hover'",
+        ),
         ("dynamics: rocket", "m.yaml:1:1: dynamics: must be 'ideal' or 'multicopter', not 'rocket'"),
         ("duration_s: !!binary aGVsbG8=", "m.yaml:1:13: duration_s: the tag"),
         ("- 1", "m.yaml:1:1: must be a mapping of keys, not [1]"),
@@ -116,6 +120,10 @@ def test_a_wrong_key_is_named_with_its_place(complaints: Complaints, text: str, 
         (
             "area: {polygon_m: [[0, 0], [1000, 1000], [1000, 0], [0, 1000]]}",
             "m.yaml:1:8: area.polygon_m: the fence crosses itself at [500, 500] m",
+        ),
+        (
+            "dynamics: ideal\nobservations: wire",
+            "m.yaml:2:1: observations: ideal points send no messages",
         ),
         (
             "area: {polygon_m: [[0, 0], [500, 0], [1000, 0]]}",

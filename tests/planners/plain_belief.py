@@ -145,7 +145,9 @@ class Shadow:
             return
         fresh = progress or not is_open
         if mind.goal is not None and not fresh and now > mind.give_up_at:
-            mind.barred[mind.goal] = True
+            row, column = mind.goal
+            block = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
+            mind.barred[block] |= ~mind.visited[block]
             fresh = True
         self._choose(i, mind, now, heading, fresh)
         if mind.goal is None:

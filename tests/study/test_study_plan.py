@@ -95,6 +95,11 @@ def test_the_dynamics_are_ideal_unless_the_mission_says_otherwise() -> None:
     assert [cell.dynamics for cell in plan.cells] == ["ideal", "ideal", "multicopter"]
 
 
+def test_who_sees_what_messages_carry_is_a_multicopter() -> None:
+    plan = make_plan(None, ["fco"], SEEDS, {}, ["observations=exact,wire"])
+    assert [cell.dynamics for cell in plan.cells] == ["ideal", "multicopter"]
+
+
 def test_the_mission_that_is_kept_holds_every_algorithm_s_parameters() -> None:
     (cell,) = make_plan(None, ["fco", "mdc"], SEEDS, {}, ["planner.inertia=0.7", "duration_s=100"]).cells
     kept = merged(cell)

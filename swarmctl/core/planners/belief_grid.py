@@ -210,10 +210,12 @@ def visit_row(memory: Records, i: int, row: int, word: int) -> bool:
 
 @kernel
 def give_up(memory: Records, i: int, row: int, column: int) -> None:
-    """Bar a cell that proved out of reach, for this vehicle alone."""
-    k = place(row, column)
-    if memory[i].cells[k] < CLOSED:
-        memory[i].cells[k] = BARRED
+    """Bar a goal that proved out of reach, and the open cells next to it, for this vehicle alone."""
+    cells = memory[i].cells
+    for r in range(max(row - 1, 0), min(row + 2, SIDE)):
+        for c in range(max(column - 1, 0), min(column + 2, SIDE)):
+            if cells[place(r, c)] < CLOSED:
+                cells[place(r, c)] = BARRED
 
 
 @kernel
