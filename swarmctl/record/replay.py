@@ -300,7 +300,10 @@ class _Replayer:
 
 def _plain(record: np.void) -> dict[str, Any]:
     """A record as JSON can hold it; numbers that JSON lacks as text."""
-    return {
-        name: value if not isinstance(value, float) or np.isfinite(value) else str(value)
-        for name, value in zip(record.dtype.names or (), record.tolist(), strict=True)
-    }
+    return {name: _plain_value(record[name].tolist()) for name in record.dtype.names or ()}
+
+
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain_value(item) for item in value]
+    return value if not isinstance(value, float) or np.isfinite(value) else str(value)

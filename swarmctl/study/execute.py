@@ -41,13 +41,15 @@ def local(workers: int | None = None) -> Iterator[Executor]:
 
 
 def run_jobs(
-    jobs: Sequence[Job], executor: Executor, done: Done = lambda runs: None, run: Simulate = simulate
+    jobs: Sequence[Job], executor: Executor, done: Done = lambda runs: None, run: Simulate | None = None
 ) -> list[Records]:
     """Each job's records, in the jobs' order, whoever finishes first; a job's error is raised here.
 
-    ``run`` does a job: RUN records, unless something else than ``simulate`` is given.
+    ``run`` does a job, and its records may be others; None is ``simulate``.
     """
-    places: dict[Future[Records], int] = {executor.submit(run, job): k for k, job in enumerate(jobs)}
+    places: dict[Future[Records], int] = {
+        executor.submit(run or simulate, job): k for k, job in enumerate(jobs)
+    }
     results: list[Records] = [np.zeros(0)] * len(jobs)
     for future in as_completed(places):
         results[places[future]] = future.result()

@@ -66,11 +66,12 @@ def test_neighbours_are_counted_whoever_moves() -> None:
 
 
 def test_a_vehicle_far_from_everything_is_free_and_one_near_the_fence_is_not() -> None:
-    flight = Flight([(450.0, 550.0), (60.0, 60.0)], AREA, speed=8.0)
+    flight = Flight([(450.0, 550.0), (25.0, 60.0)], AREA, speed=8.0)
     flight.step([(5.0, 0.0), (5.0, 0.0)])
-    flight.world.paths["east_0"] = -1.0  # written only for one that is not free, or whom others look at
+    # A vehicle's path is written only where others look at it; the last row, a candidate's, for who is not free.
+    flight.world.paths["east_0"] = -1.0
     flight.step([(5.0, 0.0), (5.0, 0.0)])
-    assert (flight.world.paths["east_0"] == -1.0).tolist() == [True, False, False]
+    assert (flight.world.paths["east_0"] == -1.0).tolist() == [True, True, False]
     assert flight.world.paths["near"][:2].tolist() == [0, 0]
     flight.world.errands["stage"][1] = stages.OVER_PAD
     here = flight.places[0][0]
