@@ -59,9 +59,12 @@ class Shadow:
         self.period = float(world.rules[0]["period"])
         self._lay_cells()
         self.minds = [
-            Mind(self._nowhere(), ~self.legal, (float(pose["east"]), float(pose["north"])))
-            for pose in world.poses
-        ]
+            Mind(
+                self._nowhere(), ~self.legal, (float(pose["east"]), float(pose["north"])),
+                first_leg=bool(memory["home"] == 0.0),
+            )
+            for pose, memory in zip(world.poses, world.memory, strict=True)
+        ]  # fmt: skip
         self.own = [self._own(i) for i in range(len(self.minds))]
         self.told: dict[int, list[Told]] = {}
 

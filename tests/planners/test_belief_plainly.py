@@ -51,6 +51,13 @@ def test_a_whole_search_in_ideal_dynamics(seed: int) -> None:
     assert watched.world.memory["lap"].max() > 0  # all was covered, and searched again
 
 
+def test_a_search_of_vehicles_that_start_all_over_the_area() -> None:
+    watched = fly_ideally(5, vehicles__launch="spread", vehicles__count=7, duration_s=600)
+    assert (watched.world.memory["home"] > 0.0).all()
+    assert watched.parted == []
+    assert watched.compared == 7 * 600
+
+
 def test_every_kind_of_trouble_at_once() -> None:
     watched = fly_ideally(
         4, vehicles__count=9, radio__loss=0.3, radio__delay_s=2.0, sensor__detection_probability=0.7,

@@ -1,10 +1,10 @@
 """Belief sweep: fly where most is to be found for the time it takes, by what is known of the ground.
 
 Each vehicle holds a map of cells: visited, promising (near a known target), unknown.  Vehicles exchange their maps
-and where they last met others, and each has a sector of the area, agreed at launch.  It flies out on the line that
-halves its sector until it sees a target or meets the fence; then, every few seconds and whenever it arrives, it
-chooses the cell that is worth most a second: promising ones most, those with many empty cells about least, those of
-another's sector half, those that another vehicle is nearer to a third.
+and where they last met others, and each has a sector of the area, agreed at launch, or a home, where vehicles start
+all over it.  With a sector it flies out on the line that halves it until it sees a target or meets the fence.  Then,
+every few seconds and whenever it arrives, it chooses the cell that is worth most a second: promising ones most, those
+with many empty cells about least, those of another's sector half, those that another vehicle is nearer to a third.
 """
 
 import math
@@ -99,7 +99,8 @@ LONG_AGO = -1e9
 def start(memory: Records, i: int, fleet: Records, rules: Records, edges: Floats) -> None:
     """Agree on the sectors; cells are laid at the first step, where the settings are at hand."""
     sectors.agree(memory, i, fleet, edges)
-    memory[i].mode, memory[i].laid, memory[i].lap = FIRST_LEG, 0, 0
+    memory[i].mode = FIRST_LEG if memory[i].home == 0.0 else SEARCH
+    memory[i].laid, memory[i].lap = 0, 0
     memory[i].goal_row, memory[i].goal_column, memory[i].counted = -1, -1, 0
     memory[i].decide_at, memory[i].give_up_at, memory[i].side = 0.0, 0.0, 0.0
     for k in range(choice.MET):
@@ -125,7 +126,9 @@ def _lay_out(
 ) -> None:
     """Lay the cells and open the window on them, before anything is known."""
     _set_worths(memory, i, settings)
-    grid.lay_cells(memory, i, fleet, edges, settings[0].cell, settings[0].cell_most)
+    # A vehicle with a home needs no map of the whole of a large area.
+    most = settings[0].cell_most if memory[i].home == 0.0 else settings[0].cell
+    grid.lay_cells(memory, i, fleet, edges, settings[0].cell, most)
     grid.centre_window(memory, i, poses[i].east, poses[i].north)
     memory[i].was_east, memory[i].was_north = poses[i].east, poses[i].north
     for row in range(grid.SIDE):

@@ -4,6 +4,9 @@ Every vehicle works its own sector out from what all know at launch: the fence, 
 out to it.  Shares are in proportion to how fast a vehicle's sensor sweeps the ground, and are dealt in the order of
 the headings, so that the ways to them do not cross.
 
+Vehicles that start far from one another have no sectors but homes: all ground about the own launch place, rather more
+than their share of the area.  So those of a large swarm search where they are.
+
 The area within an angle about the launch place is a sum over the fence's edges: of the triangles that they make with
 the launch place, counted negative where the edge is seen from its other side.  So any polygon with any keep-outs will
 do whose borders all have the legal area on the same hand, and any launch place, inside, on the border or without.
@@ -18,8 +21,10 @@ from . import common
 TURN = 2.0 * math.pi
 PROBES = 72  # wedges in which an empty one is looked for, to begin to count at
 HALVINGS = 32  # of a full turn: to 1.5e-9 rad
+APART = 0.2  # launch places are far apart at so much, root mean square from their middle, of the area's width
+HOME = 1.5  # radius of a home, that of a circle as large as the vehicle's share of the area being 1
 FIELDS = (
-    "launch_east", "launch_north", "left_east", "left_north", "right_east", "right_north", "wide",
+    "launch_east", "launch_north", "left_east", "left_north", "right_east", "right_north", "wide", "home",
 )  # fmt: skip
 
 
@@ -118,13 +123,35 @@ def _shares(fleet: Records, i: int, first: float) -> tuple[float, float]:
 
 
 @kernel
+def _far_apart(fleet: Records, east: float, north: float, whole: float) -> bool:
+    """Whether the launch places, whose middle is given, are spread over the area."""
+    squared = 0.0
+    for j in range(fleet.shape[0]):
+        dx, dy = fleet[j].pad_east - east, fleet[j].pad_north - north
+        squared += (dx * dx + dy * dy) / fleet.shape[0]
+    return bool(squared > APART * APART * abs(whole))
+
+
+@kernel
+def _settle(memory: Records, i: int, fleet: Records, whole: float) -> None:
+    """Make a home about the launch place of vehicle ``i``."""
+    begin, end = _shares(fleet, i, 0.0)
+    memory[i].launch_east, memory[i].launch_north = fleet[i].pad_east, fleet[i].pad_north
+    memory[i].home = HOME * math.sqrt((end - begin) * abs(whole) / math.pi)
+
+
+@kernel
 def agree(memory: Records, i: int, fleet: Records, edges: Floats) -> None:
-    """Work out the sector of vehicle ``i``, and head along the line that halves it."""
+    """Work out the sector of vehicle ``i``, and head along the line that halves it; or its home."""
     east, north = 0.0, 0.0
     for j in range(fleet.shape[0]):
         east += fleet[j].pad_east / fleet.shape[0]
         north += fleet[j].pad_north / fleet.shape[0]
     whole = _whole(edges)
+    memory[i].home = 0.0
+    if _far_apart(fleet, east, north, whole):
+        _settle(memory, i, fleet, whole)
+        return
     first = _empty_direction(edges, east, north, whole)
     begin, end = _shares(fleet, i, first)
     left = first + (_angle_of(edges, east, north, first, begin, whole) if begin > 0.0 else 0.0)
@@ -139,8 +166,10 @@ def agree(memory: Records, i: int, fleet: Records, edges: Floats) -> None:
 
 @kernel
 def own(memory: Records, i: int, east: float, north: float) -> bool:
-    """Whether a place lies in vehicle ``i``'s sector."""
+    """Whether a place lies in vehicle ``i``'s sector, or home."""
     x, y = east - memory[i].launch_east, north - memory[i].launch_north
+    if memory[i].home > 0.0:
+        return bool(x * x + y * y <= memory[i].home * memory[i].home)
     after_left = memory[i].left_east * y - memory[i].left_north * x >= 0.0
     before_right = memory[i].right_east * y - memory[i].right_north * x < 0.0
     return bool((after_left or before_right) if memory[i].wide != 0 else (after_left and before_right))
