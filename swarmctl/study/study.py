@@ -23,7 +23,7 @@ from .runs import Job, is_ideal, simulate
 JOB_STEPS = 240_000
 """Vehicle-steps a job, at most: so large a job is stopped, and shows progress, in a fraction of a second."""
 
-MULTICOPTER_COST = 20
+MULTICOPTER_COST = 10
 """About what a step in multicopter dynamics costs, ideal ones being 1."""
 
 JOBS_A_THREAD = 4
