@@ -1,12 +1,11 @@
 """The command line: parses, wires, prints; no logic.
 
-What a command needs is imported when it runs, so that ``swarmctl --help`` answers at once.  This is the only
-place that knows both the controller and the stub.
+What a command needs is imported when it runs, so that ``swarmctl --help`` answers at once.  This
+and the commands' modules beside it are the only place that knows both the controller and the stub.
 """
 
 import json
 import sys
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,41 +19,24 @@ from .console import (
     interruptible,
     plain_errors,
     print_algorithms,
-    print_summary,
     say,
 )
-from .core.planners import MODULES
+from .fly_cli import fly, load_mission
+from .options import (
+    PathArgument,
+    algorithm_option,
+    connect_option,
+    mission_option,
+    signing_option,
+    timeout_option,
+)
 from .paper_cli import paper
 from .study_cli import study
 from .tune_cli import tune
 
 if TYPE_CHECKING:
-    from .core.world import World
-    from .flight.lockstep import Vehicles
+    from .live_cli import Reach
     from .mission.model import Mission
-
-LEAST_MARGIN_M = 2.0
-MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
-FASTEST = 100.0
-PathArgument = click.Path(path_type=Path)
-
-
-class SpeedType(click.ParamType):  # type: ignore[type-arg]
-    """``max``, which becomes None, or a factor."""
-
-    name = "speed"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | None:
-        """Read it; anything else is a bad command line."""
-        if value in (None, "max"):
-            return None
-        try:
-            factor = float(value)
-        except ValueError:
-            factor = 0.0
-        if not 0.0 < factor <= FASTEST:
-            self.fail(f"{value!r} is neither max nor a factor up to {FASTEST:g}", param, ctx)
-        return factor
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -63,102 +45,10 @@ def main() -> None:
     """Search an area with a swarm of MAVLink vehicles, each with its own planner."""
 
 
+main.add_command(fly)
 main.add_command(paper)
 main.add_command(study)
 main.add_command(tune)
-
-algorithm_option = click.option(
-    "--algo", "algorithm", type=click.Choice(list(MODULES)), help="Planner, in place of the mission's."
-)
-mission_option = click.option(
-    "--mission", "mission_file", type=PathArgument, help="Mission file (default: the packaged paper.yaml)."
-)
-
-connect_option = click.option(
-    "--connect",
-    "urls",
-    multiple=True,
-    metavar="URL",
-    help="The vehicles there, e.g. udpin://0.0.0.0:14540-14545; may be given again.",
-)
-timeout_option = click.option(
-    "--connect-timeout",
-    type=click.FloatRange(0.1),
-    default=20.0,
-    show_default=True,
-    help="Seconds to wait for them.",
-)
-
-
-@main.command()
-@mission_option
-@algorithm_option
-@click.option("--vehicles", type=click.IntRange(1), help="How many vehicles fly.")
-@click.option(
-    "--seed", type=click.IntRange(0, 2**62), default=1, show_default=True, help="Targets, headings, planners."
-)
-@click.option("--duration", type=float, help="Length of the search in seconds.")
-@click.option(
-    "--speed",
-    type=SpeedType(),
-    metavar="max|FACTOR",
-    help="max: lockstep, as fast as it goes (default without --connect); a factor: live, so many times real time.",
-)
-@connect_option
-@timeout_option
-@click.option(
-    "--autopilot",
-    type=click.Choice(["auto", "px4", "ardupilot"]),
-    help="What stub vehicles play, and vehicles by --connect must be (auto: whatever they are).",
-)
-@click.option("--out", type=PathArgument, help="The run's folder (default: runs/DATE-TIME-ALGO).")
-@click.option("--json", "as_json", is_flag=True, help="Print summary.json, and nothing else, on stdout.")
-@click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
-def fly(
-    mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
-    speed: float | None, urls: tuple[str, ...], connect_timeout: float, autopilot: str | None, out: Path | None,
-    as_json: bool, yes: bool,
-) -> None:  # fmt: skip
-    """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
-    with plain_errors(), ExitStack() as ending:
-        from . import live_cli
-        from .dashboard import Progress
-        from .flight import fly as flight
-        from .flight.orders import Orders
-        from .mission.launch import as_found
-
-        mission = _load(mission_file, algorithm, vehicles, duration, autopilot)
-        real = live_cli.connects(mission, urls)
-        if real:
-            mission = as_found(mission)
-        else:
-            _refuse_what_stubs_cannot(mission)
-        name = mission.planner.algorithm
-        folder = flight.default_folder(out, name)
-        orders = Orders()
-        ending.callback(folder.remove_if_empty)
-        progress = Progress()
-        with interruptible(orders, progress.say, real):
-            _warm_up(mission, name)
-            what = "vehicles" if real else "stub vehicles"
-            say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
-            with progress.shown():
-                if real:
-                    outcome = live_cli.fly_connected(
-                        mission, seed, folder, urls, speed or 1.0, connect_timeout, yes, orders, progress
-                    )
-                elif speed is not None:
-                    outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, progress)
-                else:
-                    outcome = flight.fly(mission, seed, folder, _make_stubs, orders, progress.flying)
-            summary = flight.write_results(outcome, folder)
-        if as_json:
-            click.echo(json.dumps(summary, indent=2, allow_nan=False))
-        else:
-            print_summary(summary)
-        for line in outcome.complaints():
-            say(line)
-        sys.exit(outcome.exit_code())
 
 
 @main.command()
@@ -216,9 +106,11 @@ def control(run: Path, order: str, vehicle: int | None) -> None:
 @click.option("--vehicles", type=click.IntRange(1), help="How many vehicles.")
 @connect_option
 @timeout_option
+@signing_option
 def check(
-    mission_file: Path | None, vehicles: int | None, urls: tuple[str, ...], connect_timeout: float
-) -> None:
+    mission_file: Path | None, vehicles: int | None, urls: tuple[str, ...], connect_timeout: float,
+    signing_key: Path | None,
+) -> None:  # fmt: skip
     """Validate a mission and say what it is; with --connect, probe its vehicles too.  Arms nothing.
 
     A vehicle that stands where the mission expects it is given the mission's geofence, which is read back.
@@ -228,20 +120,21 @@ def check(
         from .mission.launch import as_found
         from .mission.scenario import Scenario
 
-        mission = _load(mission_file, vehicles=vehicles)
+        mission = load_mission(mission_file, vehicles=vehicles)
         scenario = Scenario(mission, ideal=False)
         targets = len(scenario.scene(1).targets)
-        real = live_cli.connects(mission, urls)
+        reach = live_cli.Reach(urls, connect_timeout, signing_key=signing_key)
+        real = live_cli.connects(mission, reach)
         click.echo(
             f"{mission.name}: valid. {len(mission.fleet)} vehicles, {mission.planner.algorithm}, "
             f"{scenario.regions.legal.area / 1e6:.3f} km² to search inside the margin, "
             f"{len(mission.keep_out)} keep-outs, {targets} targets, {mission.duration_s:g} s"
         )
         if real:
-            sys.exit(0 if _probe(as_found(mission), urls, connect_timeout) else REFUSED)
+            sys.exit(0 if _probe(as_found(mission), reach) else REFUSED)
 
 
-def _probe(mission: "Mission", urls: tuple[str, ...], timeout_s: float) -> bool:
+def _probe(mission: "Mission", reach: "Reach") -> bool:
     """Probe the vehicles; whether all may be armed."""
     from . import live_cli
     from .dashboard import Progress
@@ -249,7 +142,7 @@ def _probe(mission: "Mission", urls: tuple[str, ...], timeout_s: float) -> bool:
 
     orders, progress = Orders(), Progress()
     with interruptible(orders, lambda text: None, real=True), progress.shown():
-        return live_cli.check_connected(mission, urls, timeout_s, orders, progress)
+        return live_cli.check_connected(mission, reach, orders, progress)
 
 
 @main.command()
@@ -269,82 +162,6 @@ def report(run: Path) -> None:
         from .record.redraw import redraw
 
         click.echo(str(redraw(RunFolder.open(run))))
-
-
-def _load(
-    mission_file: Path | None, algorithm: str | None = None, vehicles: int | None = None,
-    duration: float | None = None, autopilot: str | None = None,
-) -> "Mission":  # fmt: skip
-    """The mission with what the command line says over it."""
-    from .mission.launch import flown_by
-    from .mission.load import load
-
-    given = {"planner.algorithm": algorithm, "vehicles.count": vehicles, "duration_s": duration}
-    mission = load(mission_file, {key: value for key, value in given.items() if value is not None})
-    return mission if autopilot is None else flown_by(mission, autopilot)
-
-
-def _refuse_what_stubs_cannot(mission: "Mission") -> None:
-    """Say plainly what a stub does not simulate yet, or a flight never does."""
-    complaints = []
-    if mission.dynamics == "ideal":
-        complaints.append(
-            "dynamics: fly flies multicopters, not ideal points (leave the key out, or study it)"
-        )
-    if mission.safety.fence_margin_m < LEAST_MARGIN_M:
-        complaints.append(
-            f"safety.fence_margin_m: a flight needs {LEAST_MARGIN_M:g} m for the guard (raise it)"
-        )
-    if len(mission.fleet) > MOST_SYSTEMS:
-        complaints.append(f"vehicles: MAVLink tells {MOST_SYSTEMS} vehicles apart (fly fewer, or study more)")
-    if mission.launch == "as_found":
-        complaints += _stub_pads(mission)
-    if complaints:
-        say("\n".join(complaints))
-        sys.exit(BAD_INPUT)
-
-
-def _stub_pads(mission: "Mission") -> list[str]:
-    """What is wrong with the corner grid that stubs stand in where a mission takes vehicles as found."""
-    from .mission.scenario import Scenario
-
-    try:
-        Scenario(mission, ideal=False).starts  # noqa: B018 - tried, not used
-    except ValueError as error:
-        return [f"vehicles.launch: as_found: {error} (stubs stand in a corner grid; name their pads instead)"]
-    if mission.spacing_m < mission.safety.separation_m:
-        return [
-            "vehicles.spacing_m: less than safety.separation_m (stubs stand in a grid; put them further apart)"
-        ]
-    return []
-
-
-def _warm_up(mission: "Mission", name: str) -> None:
-    from .core import bind
-    from .flight.fly import warm_up
-
-    if not bind.is_compiled(name):
-        say(f"compiling the kernels of {name}: the first start takes some seconds, later ones do not")
-    warm_up(mission, name)
-
-
-def _make_stubs(mission: "Mission", world: "World") -> "Vehicles":
-    """Stub vehicles that fly as the mission says, standing on its pads."""
-    from sim_vehicle_stub.configured import configured_fleet
-
-    from .flight.fly import autopilots, endurance_s
-
-    endurance = endurance_s(mission)
-    origin = (mission.origin.lat, mission.origin.lon, mission.origin.alt_m)
-    interval = 1.0 / mission.setpoints.rate_hz
-    return configured_fleet(
-        world.fleet,
-        origin,
-        endurance,
-        interval,
-        autopilots=autopilots(mission),
-        wind_mps=mission.stub.wind_mps,
-    )
 
 
 def _replay_stub(folder: Any, as_json: bool) -> None:

@@ -9,6 +9,8 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 
 import click
 
@@ -40,24 +42,34 @@ def fly_with_stubs(
         return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How vehicles that are there already are reached, as the command line says it."""
+
+    urls: Sequence[str] = ()
+    timeout_s: float = 20.0
+    backend: str = "mavlink"
+    signing_key: Path | None = None
+
+
 def fly_connected(
-    mission: Mission, seed: int, folder: RunFolder, urls: Sequence[str], speed: float, timeout_s: float,
-    sure: bool, orders: Orders, progress: Progress,
+    mission: Mission, seed: int, folder: RunFolder, reach: Reach, orders: Orders, progress: Progress, *,
+    speed: float, sure: bool, adapt: bool,
 ) -> Outcome:  # fmt: skip
     """Fly vehicles that are there already.  Raises AddressError for a bad URL."""
     confirm = None if sure else lambda preparation: confirm_typed(preparation, progress)
     options = LiveOptions(
-        addresses(mission, urls), speed=speed, connect_timeout_s=timeout_s, confirm=confirm,
-        watching=progress.preparing,
+        addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
+        watching=progress.preparing, adapt=adapt,
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
 
-def check_connected(
-    mission: Mission, urls: Sequence[str], timeout_s: float, orders: Orders, progress: Progress
-) -> bool:
+def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Progress) -> bool:
     """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError."""
-    options = LiveOptions(addresses(mission, urls), connect_timeout_s=timeout_s, watching=progress.preparing)
+    options = LiveOptions(
+        addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing
+    )
     preparation, ways = asyncio.run(probe(mission, options, orders))
     rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))
     click.echo(findings_table(f"{mission.name}: nothing was armed", rows))
@@ -74,14 +86,14 @@ def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
     return [parse(vehicle.connect) if vehicle.connect else [] for vehicle in mission.fleet]
 
 
-def connects(mission: Mission, urls: Sequence[str]) -> bool:
+def connects(mission: Mission, reach: Reach) -> bool:
     """Whether real vehicles are meant.  Raises AddressError for a bad URL, or where only some vehicles have one."""
-    for url in urls:
+    for url in reach.urls:
         parse(url)
     named = [vehicle.connect is not None for vehicle in mission.fleet]
-    if not urls and any(named) and not all(named):
+    if not reach.urls and any(named) and not all(named):
         raise AddressError("vehicles.connect: some vehicles have one and some have none (or give --connect)")
-    return bool(urls) or all(named)
+    return bool(reach.urls) or all(named)
 
 
 def confirm_typed(preparation: Preparation, progress: Progress) -> "asyncio.Future[bool]":

@@ -52,6 +52,7 @@ class LiveOptions:
     speed: float = 1.0
     connect_timeout_s: float = 20.0
     own_stubs: bool = False  #: our own stub vehicles: they fly as the mission says
+    adapt: bool = False  #: lower what the mission asks to what the vehicles can do, and set their parameters
     confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
     watching: Watching = lambda now, sessions: None
     wires: Callable[[], Wires] = field(default=Switchboard)
