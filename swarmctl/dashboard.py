@@ -145,7 +145,7 @@ def findings_table(title: str, rows: Sequence[tuple[int, str, Sequence[Any]]]) -
         cells = [_marked(found[item]) if item in found else "" for item in items]
         verdict = "refused" if any(f.refuses for f in findings) else "ok"
         table.add_row(str(system), where, *cells, verdict)
-    console = Console(width=None if sys.stdout.isatty() else 160, no_color=not sys.stdout.isatty())
+    console = Console(width=None if sys.stdout.isatty() else 200, no_color=not sys.stdout.isatty())
     with console.capture() as capture:
         console.print(table)
     return capture.get().rstrip()

@@ -57,7 +57,12 @@ def fly_connected(
     speed: float, sure: bool, adapt: bool,
 ) -> Outcome:  # fmt: skip
     """Fly vehicles that are there already.  Raises AddressError for a bad URL."""
-    confirm = None if sure else lambda preparation: confirm_typed(preparation, progress)
+
+    def confirm(preparation: Preparation) -> "asyncio.Future[bool]":
+        for line in (*preparation.refusals.values(), *preparation.changes, *preparation.troubles):
+            progress.say(line)
+        return agreed() if sure else confirm_typed(preparation, progress)
+
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
         watching=progress.preparing, adapt=adapt,
@@ -96,10 +101,15 @@ def connects(mission: Mission, reach: Reach) -> bool:
     return bool(reach.urls) or all(named)
 
 
+def agreed() -> "asyncio.Future[bool]":
+    """A yes that was given beforehand."""
+    answer: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
+    answer.set_result(True)
+    return answer
+
+
 def confirm_typed(preparation: Preparation, progress: Progress) -> "asyncio.Future[bool]":
     """Ask for a typed yes at the terminal."""
-    for line in (*preparation.refusals.values(), *preparation.troubles):
-        progress.say(line)
     names = ", ".join(
         f"{system} ({findings[0].value})"
         for row, (system, findings) in enumerate(zip(preparation.systems, preparation.findings, strict=True))

@@ -1,5 +1,6 @@
 """What makes ArduCopter leave the mode it is in: ground station, fence, position.  It never goes back."""
 
+import math
 from typing import TYPE_CHECKING
 
 from swarmctl.mavlink.dialect import mav
@@ -11,8 +12,8 @@ if TYPE_CHECKING:
 
 GCS_ACTIONS = {1: Mode.RTL, 3: Mode.SMART_RTL, 5: Mode.LAND}
 FENCE_ACTIONS = {1: Mode.RTL, 2: Mode.LAND, 3: Mode.SMART_RTL, 4: Mode.BRAKE}
-FENCE_SHAPES = 2 | 4
-"""The bits of FENCE_TYPE that stand for circles and polygons."""
+CEILING, RADIUS, SHAPES = 1, 2, 4
+"""The bits of FENCE_TYPE: a height above home, a circle about home, and the polygons and circles of the plan."""
 
 
 class Failsafes:
@@ -34,11 +35,15 @@ class Failsafes:
     def outside_fence(self) -> bool:
         """Whether an enabled fence is broken where the vehicle is."""
         vehicle, values = self._vehicle, self._values
-        if vehicle.fence is None or not values["FENCE_ENABLE"]:
+        if not values["FENCE_ENABLE"]:
             return False
-        if not int(values["FENCE_TYPE"]) & FENCE_SHAPES:
-            return False
-        return vehicle.fence.broken_at(*vehicle.pilot.place[:2])
+        types, place = int(values["FENCE_TYPE"]), vehicle.pilot.place[:2]
+        fence, home = vehicle.fence, vehicle.home
+        return bool(
+            (types & SHAPES and fence is not None and fence.broken_at(*place))
+            or (types & RADIUS and math.dist(place, vehicle.home_place) > values["FENCE_RADIUS"])
+            or (types & CEILING and home and vehicle.wire[2] * 1e-3 - home[2] > values["FENCE_ALT_MAX"])
+        )
 
     def watch(self) -> None:
         """Notice what has begun since the last tick."""

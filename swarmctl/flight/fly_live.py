@@ -21,7 +21,7 @@ from . import clock
 from .control import ControlServer
 from .errors import RefusedError, StoppedError
 from .fly import Report, about_flight, obey_and_report, session_settings
-from .inspection import place_en
+from .inspection import CEILING_KEPT_M, place_en
 from .journal import Journal
 from .live import FlightClock, LiveLink, LiveLoop, Wires
 from .orders import Orders, obey
@@ -111,7 +111,7 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
 
 async def _prepared(mission: Mission, link: LiveLink, options: LiveOptions) -> Preparation:
     await link.connect(options.addresses, session_settings(mission), options.connect_timeout_s)
-    preparation = Preparation(mission, link.sessions, link.clock.now())
+    preparation = Preparation(mission, link.sessions, link.clock.now(), options.adapt)
     await link.prepare(preparation)
     return preparation
 
@@ -166,5 +166,11 @@ def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) ->
         row["speed"] = min(float(row["speed"]), told.get("speed_mps", np.inf))
         row["acceleration"] = min(float(row["acceleration"]), told.get("acceleration_mps2", np.inf))
         row["braking"] = min(float(row["acceleration"]), limits.braking_mps2)
+        row["lag"] = limits.lag_s
+        row["climb"] = min(float(row["climb"]), told.get("climb_mps", np.inf))
+        row["descent"] = min(float(row["descent"]), told.get("descent_mps", np.inf))
+        ceiling = session.protection.ceiling_m
+        if ceiling is not None:
+            row["altitude"] = min(float(row["altitude"]), ceiling - CEILING_KEPT_M)
         trip = session.statistics().round_trip
         row["latency"] = limits.latency_s + (trip.median_s if trip else 0.0)

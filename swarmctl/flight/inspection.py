@@ -16,7 +16,7 @@ from swarmctl.core.arrays import Floats
 from swarmctl.mission.geometry import Regions, regions
 from swarmctl.mission.model import Mission, Vehicle
 from swarmctl.mission.pads import launch_pads
-from swarmctl.vehicle.fence import Fence
+from swarmctl.vehicle.fence import Circle, Fence
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import Session
 
@@ -26,6 +26,12 @@ HOME_HEIGHT_M = 3.0
 """Heights are told above home: it must lie within so much of the ground that the vehicle stands on."""
 MOST_ROUND_TRIP_S = 2.5
 """A link slower than this cannot be flown over: the guard looks about three seconds ahead."""
+CEILING_KEPT_M = 3.0
+"""So far a vehicle stays below a ceiling of its own."""
+LEAST_ALTITUDE_M = 5.0
+"""A mission lowered to less is flown into bushes."""
+LEAST_SETPOINTS = 3
+"""A firmware must wait for so many missed setpoints before it takes its controller for lost."""
 LEVEL_M = 3.0
 """Homes further apart in altitude than this make height layers of 6 m unsure."""
 UNKNOWN = "?"
@@ -42,10 +48,13 @@ class Finding:
 
 
 class Inspection:
-    """Inspects the vehicles of one mission, session i being its vehicle i."""
+    """Inspects the vehicles of one mission, session i being its vehicle i.
 
-    def __init__(self, mission: Mission, sessions: Sequence[Session]) -> None:
-        self._mission, self._sessions = mission, sessions
+    ``adapt``: a vehicle that cannot do what the mission asks is not refused, but flown as it can.
+    """
+
+    def __init__(self, mission: Mission, sessions: Sequence[Session], adapt: bool = False) -> None:
+        self._mission, self._sessions, self._adapt = mission, sessions, adapt
         self._regions: Regions = regions(mission)
         self._pads = launch_pads(mission)
         shapely.prepare(self._regions.legal)
@@ -53,7 +62,14 @@ class Inspection:
     def fence(self) -> Fence:
         """The mission's border and keep-outs as the vehicles' own geofence."""
         r = self._regions
-        return Fence([self._degrees(r.border)], [self._degrees(ring) for ring in r.keep_outs])
+        rings, circles = [], []
+        for shape, ring in zip(self._mission.keep_out, r.keep_outs, strict=True):
+            if shape.circle_m is None:
+                rings.append(self._degrees(ring))
+            else:
+                ((lat, lon),) = self._degrees(np.array([shape.circle_m.center_m]))
+                circles.append(Circle(lat, lon, shape.circle_m.radius_m))
+        return Fence([self._degrees(r.border)], rings, circles)
 
     def _degrees(self, ring: Floats) -> list[tuple[float, float]]:
         o = self._mission.origin
@@ -72,9 +88,51 @@ class Inspection:
             _home(session),
             self._place(i),
             self._level(i),
-            _speed(session, wanted),
+            self._speed(session, wanted),
+            self._bounds(i),
             _fence(session),
+            _failsafe(session, self._mission.setpoints.rate_hz),
         ]
+
+    def _speed(self, session: Session, wanted: Vehicle) -> Finding:
+        limit = session.parameters.get("speed_mps")
+        if limit is None:
+            return Finding("speed", UNKNOWN, "its speed limit cannot be read")
+        if limit >= wanted.speed_mps - 1e-6:
+            return Finding("speed", f"{limit:g} m/s")
+        return self._less(
+            "speed",
+            f"{limit:g} m/s",
+            f"it flies at most {limit:g} m/s, not the mission's {wanted.speed_mps:g}",
+        )
+
+    def _bounds(self, i: int) -> Finding:
+        """The vehicle's own ceiling, and its circle about home, either of which would end its flight."""
+        own = self._sessions[i].protection
+        up, out = own.ceiling_m, own.radius_m
+        limits = (f"{m:g} m {way}" for m, way in ((up, "up"), (out, "out")) if m is not None)
+        value = ", ".join(limits) or "none"
+        farthest, wanted = self._farthest(i), self._mission.fleet[i].altitude_m
+        if out is not None and farthest > out:
+            trouble = f"its own fence ends {out:g} m from home; the mission's area reaches {farthest:.0f} m"
+            return Finding("bounds", value, trouble, True)
+        if up is not None and wanted > up - CEILING_KEPT_M:
+            trouble = f"its own fence ends {up:g} m above home; the mission flies at {wanted:g} m"
+            return self._less("bounds", value, trouble, possible=up - CEILING_KEPT_M >= LEAST_ALTITUDE_M)
+        return Finding("bounds", value)
+
+    def _farthest(self, i: int) -> float:
+        """The way (m) from where it stands to the farthest corner of the area."""
+        if not self._sessions[i].telemetry.positioned:
+            return 0.0
+        corners = self._regions.border - np.array(place_en(self._mission, self._sessions[i]))
+        return float(np.hypot(corners[:, 0], corners[:, 1]).max())
+
+    def _less(self, item: str, value: str, trouble: str, possible: bool = True) -> Finding:
+        """It can do less than the mission asks: refused, or flown as it can."""
+        if self._adapt and possible:
+            return Finding(item, value, f"{trouble}: adapted")
+        return Finding(item, value, f"{trouble}{' (--adapt flies it as it can)' if possible else ''}", True)
 
     def _place(self, i: int) -> Finding:
         """Where it stands, against its pad, or, as found, against the area and the others."""
@@ -172,21 +230,28 @@ def _home(session: Session) -> Finding:
     return Finding("home", f"{away:.1f} m", trouble, far)
 
 
-def _speed(session: Session, wanted: Vehicle) -> Finding:
-    limit = session.parameters.get("speed_mps")
-    if limit is None:
-        return Finding("speed", UNKNOWN, "its speed limit cannot be read")
-    slower = limit < wanted.speed_mps - 1e-6
-    trouble = f"it flies at most {limit:g} m/s, not the mission's {wanted.speed_mps:g}" if slower else ""
-    return Finding("speed", f"{limit:g} m/s", trouble)
-
-
 def _fence(session: Session) -> Finding:
     """Its own geofence, read back, and what it would do on leaving it."""
-    action = session.parameters.get("fence_action")
-    does = "its action cannot be read" if action is None else f"action {action:g}"
     if not session.fence_verified:
         return Finding("fence", "not set", "the fence of the mission is not on board")
-    enabled = session.parameters.get("fence_enabled", 1.0)
-    trouble = "" if enabled else "its fence is on board but disabled (FENCE_ENABLE 0)"
-    return Finding("fence", f"verified, {does}", trouble)
+    does = session.protection.fence_action
+    if does is None:
+        return Finding("fence", "verified", "what it does on leaving its fence cannot be read")
+    whys = "; ".join(
+        f"{remedy.why} ({remedy.parameter} {remedy.value:g})" for remedy in session.protection.remedies
+    )
+    return Finding("fence", f"verified, {does}", f"{whys}: --adapt sets that" if whys else "")
+
+
+def _failsafe(session: Session, rate_hz: float) -> Finding:
+    """What it does when its controller is gone."""
+    protection = session.protection
+    value = protection.on_silence
+    if protection.fatal:
+        return Finding("if alone", value, protection.fatal, True)
+    patience = protection.setpoint_loss_s
+    if patience is not None and patience * rate_hz < LEAST_SETPOINTS:
+        trouble = f"it waits only {patience:g} s for a setpoint, and {rate_hz:g} a second are sent"
+        return Finding("if alone", value, trouble, True)
+    trouble = "nothing brings it down when its controller is gone (set its ground station failsafe)"
+    return Finding("if alone", value, trouble if protection.unattended else "")

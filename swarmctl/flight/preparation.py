@@ -1,5 +1,7 @@
 """From the first heartbeat to "may be armed": every vehicle ready, inspected, its own fence set and read back.
 
+Where vehicles are to be adapted to the mission, what is wrong with the parameters of their fences is set right then.
+
 The fence is set only once a vehicle has passed the inspection: one that stands elsewhere must not be given the
 fence of another place.  Whoever flies the swarm ticks this, in lockstep or live; it knows no clock.
 """
@@ -26,16 +28,23 @@ LOST_S = 60.0
 class _Part(Enum):
     READYING = auto()
     FENCING = auto()
+    ADAPTING = auto()
     DONE = auto()
 
 
 class Preparation:
-    """Prepares ``sessions`` for ``mission``; session i is its vehicle i."""
+    """Prepares ``sessions`` for ``mission``; session i is its vehicle i.
 
-    def __init__(self, mission: Mission, sessions: Sequence[Session], now: float) -> None:
+    ``adapt``: vehicles that can do less are flown as they can, and their fences' parameters are set.
+    """
+
+    def __init__(
+        self, mission: Mission, sessions: Sequence[Session], now: float, adapt: bool = False
+    ) -> None:
         self.refusals: dict[int, str] = {}  #: why a vehicle may not be armed, by its row
-        self._mission, self._sessions = mission, sessions
-        self._inspection = Inspection(mission, sessions)
+        self.changes: list[str] = []  #: parameters that were set, a line each
+        self._mission, self._sessions, self._adapt = mission, sessions, adapt
+        self._inspection = Inspection(mission, sessions, adapt)
         self.deadline = now + PREPARE_S
         self._part = _Part.READYING
         self._began = now
@@ -73,14 +82,35 @@ class Preparation:
         for i, session in enumerate(self._sessions):
             if i not in self.refusals and (reason := self._refusal(i, now)):
                 self.refusals[i] = f"vehicle {session.system}{reason}"
-        if self._part is _Part.FENCING:
+        if self._part is _Part.READYING:
+            self._set_fences()
+        elif self._part is _Part.FENCING and self._adapt:
+            self._set_parameters()
+        else:
             self._part = _Part.DONE
-            return
+
+    def _set_fences(self) -> None:
+        """Read the parameters, and put the mission's fence on board."""
         self._part = _Part.FENCING
         preflight = Preflight(read_parameters=True, fence=self._inspection.fence())
         for i, session in enumerate(self._sessions):
             if i not in self.refusals:
                 session.check(preflight)
+
+    def _set_parameters(self) -> None:
+        """Set right what the vehicles' own fences lack."""
+        self._part = _Part.ADAPTING
+        for i, session in enumerate(self._sessions):
+            remedies = session.protection.remedies
+            if i in self.refusals or not remedies:
+                continue
+            for remedy in remedies:
+                before = session.parameter(remedy.parameter)
+                was = "unknown" if before is None else f"{before:g}"
+                self.changes.append(
+                    f"vehicle {session.system}: {remedy.parameter} set to {remedy.value:g} (it was {was})"
+                )
+            session.check(Preflight(True, self._inspection.fence(), remedies))
 
     def require(self) -> None:
         """Raise RefusedError if the mission does not want to fly without those that were refused."""

@@ -18,6 +18,7 @@ FENCE: int = mav.MAV_MISSION_TYPE_FENCE
 GLOBAL: int = mav.MAV_FRAME_GLOBAL
 INCLUSION: int = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
 EXCLUSION: int = mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+CIRCLE_EXCLUSION: int = mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION
 ACCEPTED: int = mav.MAV_MISSION_ACCEPTED
 
 REQUESTS = (mav.MAVLINK_MSG_ID_MISSION_REQUEST, mav.MAVLINK_MSG_ID_MISSION_REQUEST_INT)
@@ -30,19 +31,29 @@ FENCE_MESSAGES = frozenset((*REQUESTS, ACK, COUNT, ITEM_INT))
 _PASSING = (mav.MAV_MISSION_ERROR, mav.MAV_MISSION_INVALID_SEQUENCE, mav.MAV_MISSION_OPERATION_CANCELLED)
 # Some firmwares keep degrees as floating-point numbers: a hundredth of a metre.
 _TOLERANCE_E7 = 1
+_TOLERANCE_M = 0.01
 
 Polygon = Sequence[tuple[float, float]]
 
 
+class Circle(NamedTuple):
+    """A circle to stay out of: its centre in degrees, its radius in metres."""
+
+    lat: float
+    lon: float
+    radius_m: float
+
+
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """Where the vehicle may be: polygons of (latitude, longitude) in degrees, not closed.
+    """Where the vehicle may be: polygons of (latitude, longitude) in degrees, not closed; and circles, where not.
 
     Raises ``ValueError`` for a polygon of fewer than three vertices, or for no polygon at all.
     """
 
     inclusions: Sequence[Polygon]
     exclusions: Sequence[Polygon] = ()
+    circles: Sequence[Circle] = ()
 
     def __post_init__(self) -> None:
         polygons = (*self.inclusions, *self.exclusions)
@@ -52,30 +63,39 @@ class Fence:
     def vertices(self) -> "list[Vertex]":
         """All vertices, in the order of transfer."""
         kinds = ((INCLUSION, self.inclusions), (EXCLUSION, self.exclusions))
-        return [
+        polygons = [
             Vertex(kind, len(polygon), round(lat * 1e7), round(lon * 1e7))
             for kind, polygons in kinds
             for polygon in polygons
             for lat, lon in polygon
         ]
+        circles = [
+            Vertex(CIRCLE_EXCLUSION, radius, round(lat * 1e7), round(lon * 1e7))
+            for lat, lon, radius in self.circles
+        ]
+        return polygons + circles
+
+
+_KINDS = {INCLUSION: "inclusion", EXCLUSION: "exclusion", CIRCLE_EXCLUSION: "exclusion circle"}
 
 
 class Vertex(NamedTuple):
-    """One vertex as it crosses the link: its MAV_CMD, its polygon's vertices, degrees × 1e7."""
+    """One vertex, or circle, as it crosses the link: MAV_CMD, its polygon's vertices or radius (m), degrees × 1e7."""
 
     command: int
-    of: int
+    of: float
     lat_e7: int
     lon_e7: int
 
     def __str__(self) -> str:
-        kind = {INCLUSION: "inclusion", EXCLUSION: "exclusion"}.get(self.command, f"command {self.command}")
-        return f"{kind} of {self.of}, {self.lat_e7 / 1e7:.7f}, {self.lon_e7 / 1e7:.7f}"
+        kind = _KINDS.get(self.command, f"command {self.command}")
+        return f"{kind} of {self.of:g}, {self.lat_e7 / 1e7:.7f}, {self.lon_e7 / 1e7:.7f}"
 
     def equals(self, other: "Vertex") -> bool:
         """Whether the other is this one, but for rounding."""
         off_e7 = max(abs(self.lat_e7 - other.lat_e7), abs(self.lon_e7 - other.lon_e7))
-        return off_e7 <= _TOLERANCE_E7 and (self.command, self.of) == (other.command, other.of)
+        alike = self.command == other.command and abs(self.of - other.of) <= _TOLERANCE_M
+        return off_e7 <= _TOLERANCE_E7 and alike
 
 
 class FenceTransfer:
@@ -121,7 +141,7 @@ class FenceTransfer:
         """MISSION_ITEM_INT: one vertex; the next is asked for, once."""
         if self._count is None or f.seq >= self._count or f.seq in self._read:
             return ()
-        of = round(f.param1) if math.isfinite(f.param1) else 0
+        of = f.param1 if math.isfinite(f.param1) else 0.0
         self._read[f.seq] = Vertex(f.command, of, f.x, f.y)
         return self.next_read(0)
 

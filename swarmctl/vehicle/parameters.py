@@ -1,4 +1,4 @@
-"""Reading the firmware's parameters: the names it may know them by, and how a value crosses the link.
+"""Reading and setting the firmware's parameters: the names it may know them by, and how a value crosses the link.
 
 A quantity is asked for by all its names at once, because firmwares rename their parameters and answer an
 unknown name with PARAM_ERROR or not at all.  MAVLink carries every value in a float field: PX4 puts an
@@ -62,12 +62,15 @@ class Parameters:
 
     def __init__(self) -> None:
         self.values: dict[str, float] = {}  #: by the parameter's own name, in its own unit
+        self.types: dict[str, int] = {}  #: MAV_PARAM_TYPE of each
         self.absent: set[str] = set()  #: names that the vehicle says it does not have
 
     def take(self, frame: Frame, bytewise: bool) -> None:
         """Take in a PARAM_VALUE or PARAM_ERROR; ``bytewise``: how this firmware sends its integers."""
         if frame.message_id == PARAM_VALUE:
-            self.values[_text(frame.fields.param_id)] = _value(frame, bytewise)
+            name = _text(frame.fields.param_id)
+            self.values[name] = _value(frame, bytewise)
+            self.types[name] = frame.fields.param_type
         else:
             self.absent.add(_text(frame.fields.param_id))
 
@@ -81,6 +84,30 @@ class Parameters:
     def refusal(self, quantity: Quantity) -> str:
         """Why the quantity cannot be had: the vehicle has no parameter of these names; or nothing."""
         return "the vehicle has no such parameter" if self.absent.issuperset(quantity.spellings) else ""
+
+
+class ParameterWrite(NamedTuple):
+    """Sets a parameter, with the type that the vehicle has told of it."""
+
+    parameter: str
+    value: float
+    known: Parameters
+    bytewise: bool
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+        return f"PARAM_SET {self.parameter} {self.value:g}"
+
+    def messages(self, system: int, confirmation: int) -> tuple[Any, ...]:
+        """PARAM_SET, which is answered with the value that the parameter then has."""
+        kind = self.known.types.get(self.parameter, mav.MAV_PARAM_TYPE_REAL32)
+        code = _INTEGERS.get(kind)
+        value = self.value
+        if code is not None and self.bytewise:
+            (value,) = struct.unpack("<f", struct.pack(code, round(self.value)).ljust(4, b"\0"))
+        name = self.parameter.encode()
+        return (mav.MAVLink_param_set_message(system, AUTOPILOT_COMPONENT, name, value, kind),)
 
 
 def _text(name: str | bytes) -> str:

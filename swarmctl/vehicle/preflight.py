@@ -10,17 +10,29 @@ from swarmctl.mavlink.codec import Frame
 from .autopilots.adapter import Adapter
 from .fence import FENCE_MESSAGES, Fence, FenceReading, FenceTransfer, FenceUpload
 from .link import GROUND_COMPONENT, GROUND_SYSTEM, Link
-from .parameters import PARAM_ERROR, PARAM_VALUE, ParameterRead, Parameters, Quantity
+from .parameters import (
+    PARAM_ERROR,
+    PARAM_VALUE,
+    ParameterRead,
+    Parameters,
+    ParameterWrite,
+    Quantity,
+)
+from .protection import Remedy
 from .settings import SessionSettings
 from .steps import OnFailure, Step
 
 
 @dataclass(frozen=True, slots=True)
 class Preflight:
-    """What to do before READY.  The fence is the firmware's own; None leaves it as it is."""
+    """What to do before READY.  The fence is the firmware's own; None leaves it as it is.
+
+    ``remedies``: parameters to set, of those that were read before.
+    """
 
     read_parameters: bool = False
     fence: Fence | None = None
+    remedies: tuple[Remedy, ...] = ()
 
 
 class Checks:
@@ -43,11 +55,12 @@ class Checks:
         self.transfer = None
 
     def begin(self, adapter: Adapter) -> tuple[Step, ...]:
-        """The steps: the parameters that are not known yet, then the fence."""
+        """The steps: the parameters that are not known yet, those to be set, then the fence."""
         steps: list[Step] = []
         if self._preflight.read_parameters:
             unknown = (q for q in adapter.quantities if self.parameters.get(q) is None)
             steps += [self._reading(quantity) for quantity in unknown]
+        steps += [self._setting(remedy, adapter.integers_bytewise) for remedy in self._preflight.remedies]
         if self._preflight.fence is not None:
             steps += self._fencing(self._preflight.fence)
         return tuple(steps)
@@ -62,6 +75,17 @@ class Checks:
             failed=lambda: self.parameters.refusal(quantity),
             insists=True,
             on_failure=OnFailure.WARN,
+        )
+
+    def _setting(self, remedy: Remedy, bytewise: bool) -> Step:
+        """One parameter set, by the vehicle's own word."""
+        name, value = remedy.parameter, remedy.value
+        return Step(
+            f"{name} {value:g}",
+            self._settings.parameter_patience_s,
+            command=ParameterWrite(name, value, self.parameters, bytewise),
+            confirmed=lambda t: self.parameters.values.get(name) == value,
+            insists=True,
         )
 
     def _fencing(self, fence: Fence) -> tuple[Step, ...]:

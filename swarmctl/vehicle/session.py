@@ -31,6 +31,7 @@ from .link import GROUND_COMPONENT, GROUND_SYSTEM
 from .machine import Machine
 from .phases import FLYING, SET_UP, TABLE, Phase, Signal
 from .preflight import Preflight
+from .protection import Protection
 from .reading import READERS, read_position
 from .statistics import Statistics
 from .steps import TIME_SLACK_S
@@ -228,6 +229,17 @@ class Session(Machine):
             return {}
         known = ((q.name, self._checks.parameters.get(q)) for q in self.adapter.quantities)
         return {name: value for name, value in known if value is not None}
+
+    def parameter(self, name: str) -> float | None:
+        """A parameter that the preflight read or set, by the firmware's own name and unit."""
+        return self._checks.parameters.values.get(name)
+
+    @property
+    def protection(self) -> Protection:
+        """What the vehicle does by itself when something goes wrong, by what the preflight read."""
+        if self.adapter is None:
+            return Protection(None, "unknown")
+        return self.adapter.protection(self.parameters)
 
     @property
     def fence_verified(self) -> bool:

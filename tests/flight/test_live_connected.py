@@ -100,7 +100,7 @@ def test_check_shows_what_it_found_and_arms_nothing(start: Start, stubs: Start, 
     assert "px4 1.17.0" in rows[0] and "ardupilot 4.8.0" in rows[1]
     for row in rows:
         assert "100 %" in row and "m E," in row and "m/s" in row and "verified" in row
-    assert "vehicle 2: its fence is on board but disabled (FENCE_ENABLE 0)" in out
+    assert "its fence is switched off (FENCE_ENABLE 1)" in out and "(GF_ACTION 3): --adapt sets that" in out
     # and nobody was: they are still there to be checked again
     again = start("swarmctl", "check", "--mission", tmp_path / "there.yaml", "--connect", url)
     assert again.wait(PATIENCE_S) == 0

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.vehicle.commands import Command
 from swarmctl.vehicle.parameters import Quantity
+from swarmctl.vehicle.protection import Protection, Told
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.steps import Step
 from swarmctl.vehicle.telemetry import Telemetry
@@ -40,10 +41,15 @@ class Modes:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How the vehicle brakes from its speed to standstill, and how long it takes to begin."""
+    """How the vehicle comes from its speed to standstill, for the guard, which must never be too hopeful.
+
+    After ``latency_s`` it follows a velocity with a first-order lag of ``lag_s``, and gets slower by
+    ``braking_mps2`` at most (core/motion.py).
+    """
 
     braking_mps2: float
     latency_s: float
+    lag_s: float = 0.0
 
 
 class Adapter(Protocol):
@@ -64,6 +70,9 @@ class Adapter(Protocol):
     @property
     def quantities(self) -> tuple[Quantity, ...]:
         """The parameters that bound its motion and say what its failsafes do."""
+
+    def protection(self, told: Told) -> Protection:
+        """What its parameters make of its fence and its failsafes."""
 
     @property
     def integers_bytewise(self) -> bool:

@@ -8,7 +8,7 @@ A velocity is flown only if all its three axes are given: the altitude loop is c
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -22,6 +22,7 @@ from swarmctl.vehicle.commands import (
     command,
 )
 from swarmctl.vehicle.parameters import Quantity
+from swarmctl.vehicle.protection import Protection, Remedy, Told
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.steps import Step
 from swarmctl.vehicle.telemetry import Telemetry
@@ -65,11 +66,23 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("descent_mps", {"WP_SPD_DN": 1.0, "WPNAV_SPEED_DN": 0.01}),
     Quantity("fence_enabled", {"FENCE_ENABLE": 1.0}),
     Quantity("fence_action", {"FENCE_ACTION": 1.0}),
+    Quantity("fence_types", {"FENCE_TYPE": 1.0}),
+    Quantity("fence_ceiling_m", {"FENCE_ALT_MAX": 1.0}),
+    Quantity("fence_radius_m", {"FENCE_RADIUS": 1.0}),
     Quantity("avoidance", {"AVOID_ENABLE": 1.0}),
     Quantity("setpoint_loss_s", {"GUID_TIMEOUT": 1.0}),
     Quantity("ground_station_loss_action", {"FS_GCS_ENABLE": 1.0}),
     Quantity("return_height_m", {"RTL_ALT_M": 1.0, "RTL_ALT": 0.01}),
 )
+
+RETURN = 1  # of FENCE_ACTION
+CEILING, RADIUS, POLYGONS = 1, 2, 4  # of FENCE_TYPE
+AVOID_FENCE = 1  # of AVOID_ENABLE
+_FENCE_ACTIONS = {
+    0: "only warns", RETURN: "returns", 2: "lands", 3: "returns", 4: "brakes", 5: "returns or lands",
+}  # fmt: skip
+_BRINGS_BACK = (RETURN, 3, 5)
+_SILENCE_ACTIONS = {0: "hovers", 5: "lands", 7: "brakes"}
 
 PREARM_CHECK: int = mav.MAV_SYS_STATUS_PREARM_CHECK
 ABSOLUTE_POSITION: int = mav.EKF_POS_HORIZ_ABS
@@ -107,6 +120,22 @@ def _take_off(altitude_m: float) -> Command:
     return command("NAV_TAKEOFF", mav.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, altitude_m)
 
 
+def _remedies(told: Told, enabled: bool, types: int, does: str) -> Iterator[Remedy]:
+    """A fence that is switched on here is the mission's alone: the firmware's own circle is 300 m by default."""
+    if told.get("fence_action") is not None and int(told["fence_action"]) not in _BRINGS_BACK:
+        yield Remedy("FENCE_ACTION", RETURN, f"leaving its fence {does}, and should return")
+    if "fence_enabled" not in told or "fence_types" not in told:
+        return
+    if not enabled:
+        yield Remedy("FENCE_TYPE", POLYGONS, "the mission's fence, without a circle and a ceiling of its own")
+        yield Remedy("FENCE_ENABLE", 1, "its fence is switched off")
+    elif not types & POLYGONS:
+        yield Remedy("FENCE_TYPE", types | POLYGONS, "its fence does not heed polygons")
+    avoids = int(told.get("avoidance", 0.0))
+    if avoids & AVOID_FENCE:
+        yield Remedy("AVOID_ENABLE", avoids & ~AVOID_FENCE, "it slows down before its fence by itself")
+
+
 class ArduPilot:
     """The adapter for ArduCopter."""
 
@@ -122,6 +151,21 @@ class ArduPilot:
     def __init__(self) -> None:
         self._mode = -1
         self._prearm = self._estimate = self._local = False
+
+    def protection(self, told: Told) -> Protection:
+        """Its fence counts only while FENCE_ENABLE is set; a controller is missed only with FS_GCS_ENABLE."""
+        enabled, types = bool(told.get("fence_enabled", 0.0)), int(told.get("fence_types", POLYGONS))
+        action, silence = told.get("fence_action"), int(told.get("ground_station_loss_action", 0.0))
+        does = "unknown" if action is None else _FENCE_ACTIONS.get(int(action), f"action {action:g}")
+        return Protection(
+            fence_action=None if action is None else does if enabled and types & POLYGONS else "does nothing",
+            on_silence=_SILENCE_ACTIONS.get(silence, "returns"),
+            remedies=tuple(_remedies(told, enabled, types, does)),
+            ceiling_m=told.get("fence_ceiling_m") if enabled and types & CEILING else None,
+            radius_m=told.get("fence_radius_m") if enabled and types & RADIUS else None,
+            unattended=silence == 0,
+            setpoint_loss_s=told.get("setpoint_loss_s"),
+        )
 
     def set_mode(self, mode: int) -> Command:
         """DO_SET_MODE takes the mode's number whole."""

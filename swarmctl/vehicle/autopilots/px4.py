@@ -21,6 +21,7 @@ from swarmctl.vehicle.commands import (
     take_off,
 )
 from swarmctl.vehicle.parameters import Quantity
+from swarmctl.vehicle.protection import Protection, Remedy, Told
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.steps import Step
 from swarmctl.vehicle.telemetry import Telemetry
@@ -66,10 +67,26 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("climb_mps", {"MPC_Z_VEL_MAX_UP": 1.0}),
     Quantity("descent_mps", {"MPC_Z_VEL_MAX_DN": 1.0}),
     Quantity("fence_action", {"GF_ACTION": 1.0}),
+    Quantity("fence_ceiling_m", {"GF_MAX_VER_DIST": 1.0}),
+    Quantity("fence_radius_m", {"GF_MAX_HOR_DIST": 1.0}),
     Quantity("setpoint_loss_s", {"COM_OF_LOSS_T": 1.0}),
+    Quantity("setpoint_loss_action", {"COM_OBL_RC_ACT": 1.0}),
     Quantity("ground_station_loss_action", {"NAV_DLL_ACT": 1.0}),
     Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
+
+RETURN = 3  # of GF_ACTION and COM_OBL_RC_ACT
+_FENCE_ACTIONS = {
+    0: "does nothing",
+    1: "only warns",
+    2: "holds",
+    RETURN: "returns",
+    4: "cuts its motors",
+    5: "lands",
+}
+# A pilot's modes, without a radio control, become a return.
+_LOSS_ACTIONS = {0: "returns", 1: "returns", 2: "returns", RETURN: "returns", 4: "lands", 5: "holds"}
+_STOPS_MOTORS = (6, 7)
 
 # What the onboard link carries often, or at every change of mode, without being asked.
 UNWANTED_MESSAGES: tuple[int, ...] = (
@@ -96,6 +113,11 @@ LOCAL_NED: int = mav.MAV_FRAME_LOCAL_NED
 VELOCITY_AT_ALTITUDE = 1 | 2 | 32 | 64 | 128 | 256 | 2048
 
 
+def _word(words: Mapping[int, str], action: float | None) -> str:
+    """What an action does, or its number."""
+    return "unknown" if action is None else words.get(int(action), f"action {action:g}")
+
+
 class Px4:
     """The adapter for PX4."""
 
@@ -107,6 +129,24 @@ class Px4:
     integers_bytewise = True
     extra_rates: Mapping[int, float] = MappingProxyType({})
     needs_origin = True
+
+    def protection(self, told: Told) -> Protection:
+        """GF_ACTION and COM_OBL_RC_ACT; a limit of 0 is none."""
+        fence, loss = told.get("fence_action"), int(told.get("setpoint_loss_action", 0.0))
+        back = Remedy(
+            "GF_ACTION", RETURN, f"leaving its fence {_word(_FENCE_ACTIONS, fence)}, and should return"
+        )
+        return Protection(
+            fence_action=None if fence is None else _word(_FENCE_ACTIONS, fence),
+            on_silence=_word(_LOSS_ACTIONS, loss),
+            remedies=(back,) if fence is not None and fence != RETURN else (),
+            ceiling_m=told.get("fence_ceiling_m") or None,
+            radius_m=told.get("fence_radius_m") or None,
+            setpoint_loss_s=told.get("setpoint_loss_s"),
+            fatal=f"COM_OBL_RC_ACT {loss} stops its motors when setpoints stop"
+            if loss in _STOPS_MOTORS
+            else "",
+        )
 
     def prepare(self, settings: SessionSettings) -> tuple[Step, ...]:
         """Out of OFFBOARD, but never of a vehicle that somebody has armed.
