@@ -13,7 +13,7 @@ from fastcrc import crc16
 
 from . import messages
 from .dialect import mav
-from .messages import HOT_MESSAGES, HotMessage
+from .messages import BY_FIELDS, HOT_MESSAGES, HotMessage
 
 _mcrf4xx = crc16.mcrf4xx
 _HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, incompatible, compatible, sequence, ids, message id
@@ -81,7 +81,8 @@ class Decoder:
             if length >= payload.size
             else payload.unpack(data[10:-2].ljust(payload.size, b"\0"))
         )
-        return Frame(low, system, component, sequence, hot.fields._make(values), data)
+        fields = hot.fields._make(hot.grouped(values) if hot.lengths else values)
+        return Frame(low, system, component, sequence, fields, data)
 
     def _scan(self, buffer: bytes, ended: bool) -> list[Frame]:
         """All frames in ``buffer``, however it was cut; an unfinished one at its end is kept for later.
@@ -193,7 +194,10 @@ class Encoder:
         self._packer = mav.MAVLink(None, system, component)
 
     def encode(self, message: Any) -> bytes:
-        """The frame of any pymavlink message object."""
+        """The frame of any pymavlink message object, or of a frequent message's tuple."""
+        hot = BY_FIELDS.get(type(message))
+        if hot is not None:
+            return self._frame(hot, hot.payload.pack(*(hot.flat(message) if hot.lengths else message)))
         self._packer.seq = self.sequence
         frame: bytes = message.pack(self._packer)
         self.sequence = (self.sequence + 1) & 0xFF
