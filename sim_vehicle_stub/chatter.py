@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from swarmctl.mavlink import messages
 from swarmctl.mavlink.dialect import mav
 
 if TYPE_CHECKING:
@@ -104,18 +105,21 @@ def position_target_global_int(vehicle: "StubVehicle") -> Any:
 
 def system_time(vehicle: "StubVehicle") -> Any:
     """SYSTEM_TIME."""
-    return mav.MAVLink_system_time_message(0, vehicle.boot_ms)
+    return messages.SystemTime(0, vehicle.boot_ms)
 
 
 def estimator_status(vehicle: "StubVehicle") -> Any:
     """ESTIMATOR_STATUS."""
     flags = ESTIMATES_ALL if vehicle.located else 0
-    return mav.MAVLink_estimator_status_message(vehicle.boot_ms * 1000, flags, *[0.05] * 6, 0.3, 0.3)
+    fit, accuracy_m = 0.05, 0.3
+    return messages.EstimatorStatus(
+        vehicle.boot_ms * 1000, fit, fit, fit, fit, fit, fit, accuracy_m, accuracy_m, flags
+    )
 
 
 def vibration(vehicle: "StubVehicle") -> Any:
     """VIBRATION."""
-    return mav.MAVLink_vibration_message(vehicle.boot_ms * 1000, 0.0, 0.0, 0.0, 0, 0, 0)
+    return messages.Vibration(vehicle.boot_ms * 1000, 0.0, 0.0, 0.0, 0, 0, 0)
 
 
 MESSAGES: dict[int, Callable[["StubVehicle"], Any | None]] = {

@@ -19,6 +19,8 @@ CIRCLES: dict[int, bool] = {
     mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: False,
 }
 Place = tuple[float, float]
+ROUNDING_M = 1e-6
+"""By so much less is a place clear of a border than its distance says."""
 
 
 class Polygon(NamedTuple):
@@ -90,9 +92,20 @@ class Fence:
         self._zones = zones
         self._keep_in = [zone.shape for zone in zones if zone.inside]
         self._keep_out = [zone.shape for zone in zones if not zone.inside]
+        self._asked: tuple[Place, float, bool] = ((0.0, 0.0), 0.0, False)
 
     def broken_at(self, east: float, north: float) -> bool:
-        """Whether nobody may be here."""
+        """Whether nobody may be here.  Nearer to where it was asked last than any border was, nothing has changed."""
+        place = (east, north)
+        asked_at, clear_m, broken = self._asked
+        if math.dist(asked_at, place) < clear_m:
+            return broken
+        broken = self._breaks(east, north)
+        clear_m = math.dist(place, self.nearest(east, north)) - ROUNDING_M if self._zones else math.inf
+        self._asked = (place, clear_m, broken)
+        return broken
+
+    def _breaks(self, east: float, north: float) -> bool:
         if any(shape.holds(east, north) for shape in self._keep_out):
             return True
         return bool(self._keep_in) and not any(shape.holds(east, north) for shape in self._keep_in)

@@ -131,9 +131,9 @@ class StubFleet:
         """Give every vehicle its place and motion, true and as its sensors read them."""
         read_sensors(self.truth, self._wire, self._altitude_errors, *self._origin)
         boot_ms = round(self._steps * self._step_s * 1000.0)
-        rows: Any = self._rows.tolist()
-        wires: Any = self._wire.tolist()
-        for vehicle, row, wire in zip(self.vehicles, rows, wires, strict=True):
-            vehicle.pilot.place = tuple(row)
-            vehicle.wire = tuple(wire)
+        places: Any = map(tuple, self._rows.tolist())
+        wires: Any = map(tuple, self._wire.tolist())
+        for vehicle, place, wire in zip(self.vehicles, places, wires, strict=True):
+            vehicle.pilot.place = place
+            vehicle.wire = wire
             vehicle.boot_ms = max(0, boot_ms - vehicle.boot_offset_ms)

@@ -38,10 +38,14 @@ class Streams:
         """Ids of the messages to send now.  One that was due more than once is sent once."""
         if now_us < self._next:
             return []
-        due = self._due
-        taken = [message_id for message_id, at in due.items() if at <= now_us]
-        for message_id in taken:
-            interval = self._intervals[message_id]
-            due[message_id] += interval * ((now_us - due[message_id]) // interval + 1)
-        self._next = min(due.values(), default=NEVER_US)
+        taken = []
+        self._next = NEVER_US
+        for message_id, at in self._due.items():
+            if at <= now_us:
+                taken.append(message_id)
+                interval = self._intervals[message_id]
+                at += interval * ((now_us - at) // interval + 1)
+                self._due[message_id] = at
+            if at < self._next:
+                self._next = at
         return taken

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swarmctl.mavlink import messages
 from swarmctl.mavlink.dialect import CURRENT_MODE, CurrentMode, mav
 
 from . import chatter
@@ -77,9 +78,7 @@ def battery_status(vehicle: "StubVehicle") -> bytes:
     """BATTERY_STATUS."""
     percent = vehicle.battery.percent
     cells = [_battery_mv(percent) // 4] * 4 + [0xFFFF] * 6
-    return vehicle.encode(
-        mav.MAVLink_battery_status_message(0, 0, 0, 0x7FFF, cells, -1, -1, -1, int(percent))
-    )
+    return vehicle.encode(messages.BatteryStatus(-1, -1, 0x7FFF, cells, -1, 0, 0, 0, int(percent)))
 
 
 def global_position_int(vehicle: "StubVehicle") -> bytes | None:
@@ -117,7 +116,7 @@ def home_position(vehicle: "StubVehicle") -> bytes | None:
     lat_e7, lon_e7 = (round(float(np.float32(degrees)) * 1e7) for degrees in (lat, lon))
     level = [1.0, 0.0, 0.0, 0.0]
     return vehicle.encode(
-        mav.MAVLink_home_position_message(
+        messages.HomePosition(
             lat_e7, lon_e7, round(alt * 1000.0), 0.0, 0.0, 0.0, level, math.nan, math.nan, math.nan,
             vehicle.boot_ms * 1000,
         )
@@ -178,7 +177,7 @@ def ekf_status_report(vehicle: "StubVehicle") -> bytes:
 
 def timesync(vehicle: "StubVehicle") -> bytes:
     """TIMESYNC, as a question."""
-    return vehicle.encode(mav.MAVLink_timesync_message(0, vehicle.boot_ms * 1_000_000))
+    return vehicle.encode(messages.Timesync(0, vehicle.boot_ms * 1_000_000))
 
 
 def current_mode(vehicle: "StubVehicle") -> bytes:

@@ -14,6 +14,7 @@ from typing import Any
 from swarmctl.core.calls import to_geodetic
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.messages import Timesync
 
 from . import commands, file_transfer, parameter_link, telemetry
 from .battery import Battery
@@ -216,11 +217,11 @@ class StubVehicle:
     # Sending
 
     def encode(self, message: Any) -> bytes:
-        """The frame of a pymavlink message."""
+        """The frame of a message, as the encoder takes it."""
         return self.encoder.encode(message)
 
     def send_message(self, message: Any) -> None:
-        """Send a pymavlink message."""
+        """Send a message, as the encoder takes it."""
         self._outbox.append(self.encoder.encode(message))
 
     def can_send(self, message_id: int) -> bool:
@@ -272,7 +273,7 @@ class StubVehicle:
 
     def _timesync(self, frame: Frame) -> None:
         if frame.fields.tc1 == 0:
-            self.send_message(mav.MAVLink_timesync_message(self._now_us * 1000, frame.fields.ts1))
+            self.send_message(Timesync(self._now_us * 1000, frame.fields.ts1))
 
     def _set_mode(self, frame: Frame) -> None:
         """SET_MODE, the older message of the command, which answers as that does."""

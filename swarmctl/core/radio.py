@@ -1,5 +1,7 @@
 """Radio: who hears whose beacon.  It emulates range, loss and delay; a real network takes its place.
 
+Two hear each other up to the shorter of their ranges; range 0 is a radio that is off, even on the very same spot.
+
 A beacon is sent once a period and heard, after the delay, by every vehicle that was in range when it was
 sent and did not lose it.  Beacons on their way lie in a ring of slots, one a period.
 
@@ -62,7 +64,7 @@ def _all_pairs(
             squared = dx * dx + dy * dy
             nearest = min(nearest, squared)
             reach = min(reach_i, fleet[j].radio_range)
-            if squared <= reach * reach:
+            if reach > 0.0 and squared <= reach * reach:
                 _hear(fleet, i, j, rules, tick, slot, heard, heard_count)
                 _hear(fleet, j, i, rules, tick, slot, heard, heard_count)
     return nearest
@@ -127,7 +129,7 @@ def _by_cells(
                 squared = dx * dx + dy * dy
                 nearest = min(nearest, squared)
                 reach = min(reach_i, fleet[j].radio_range)
-                if squared <= reach * reach:
+                if reach > 0.0 and squared <= reach * reach:
                     _hear(fleet, j, i, rules, tick, slot, heard, heard_count)
     return nearest
 

@@ -75,10 +75,12 @@ class Lockstep:
                 if session.phase is Phase.ENGAGED and session.telemetry.received_at != now:
                     raise FlightError(f"vehicle {session.system}: no position in the tick at {now:.1f} s")
             self._swarm.tick(k, now)
+            frames: list[bytes] = []
             for session, vehicle in links:
                 for datagram in session.outgoing():
                     vehicle.receive(datagram, now)
-                self._journal.frames(now, session.traffic())
+                frames += session.traffic()
+            self._journal.frames(now, frames)
             self._track.add(now, self._vehicles.truth)
             self._journal.breathe(now)
             each_tick(now)

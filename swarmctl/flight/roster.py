@@ -39,6 +39,11 @@ class Roster:
         return [s for s, gone in zip(self._sessions, self.dropped, strict=True) if gone is None]
 
     @property
+    def empty(self) -> bool:
+        """Whether all dropped out."""
+        return None not in self.dropped
+
+    @property
     def anybody_flies_for_us(self) -> bool:
         """Whether a vehicle is in the air that obeys us."""
         return any(session.phase in FLYING for session in self._sessions)

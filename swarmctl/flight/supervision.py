@@ -8,8 +8,6 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from swarmctl.core import stages
 from swarmctl.core.world import World
 from swarmctl.mission.model import Mission
@@ -24,8 +22,8 @@ WATCH_S = 300.0
 """After all of ours are down: one that is still silent, or beyond help, is waited for no longer."""
 RELEASED_S = 1800.0
 """One that somebody else flies is watched until it is down, and may be retaken, but no longer than a battery lasts."""
-SLOW_ROUND_TRIP_S, SLOW_S = 2.0, 10.0
-"""A link that is slower than this, and by half a second slower than the guard counts on, for so long."""
+SLOW_ROUND_TRIP_S, SLOWER_BY_S, SLOW_S = 2.0, 0.5, 10.0
+"""A link that is slower than this, and by so much slower than the guard counts on, for so long."""
 EMERGENCY_PERCENT = 5
 """A battery so low may not last for the way home."""
 RETURN_S, RETURN_VEHICLE_S, DETOURS = 600.0, 10.0, 4.0
@@ -45,7 +43,7 @@ class Supervision:
         self._kept_percent = mission.safety.battery_return_percent
         self._world, self._sessions, self._roster, self._note = world, sessions, roster, note
         self._battery_low = [False] * len(sessions)
-        self._quick_at = np.zeros(len(sessions))
+        self._quick_at = [0.0] * len(sessions)
         self._told_to_land: set[int] = set()
         self._watched_since: float | None = None
         self._returns_since: float | None = None
@@ -76,13 +74,20 @@ class Supervision:
 
     def out_of_touch(self, now: float) -> list[int]:
         """Rows of those whose link has become slower than the guard counts on; each is told once."""
-        most = np.maximum(self._world.fleet["latency"] + 0.5, SLOW_ROUND_TRIP_S)
-        trips = np.array([s.round_trip_s or 0.0 for s in self._sessions])
-        ours = np.array([s.phase is Phase.ENGAGED for s in self._sessions])
-        self._quick_at[~ours | (trips <= most)] = now
-        rows: list[int] = np.flatnonzero(now - self._quick_at >= SLOW_S).tolist()
-        self._quick_at[rows] = now
+        rows = []
+        for i, session in enumerate(self._sessions):
+            if session.phase is not Phase.ENGAGED or not self._is_slow(i, session.round_trip_s or 0.0):
+                self._quick_at[i] = now
+            elif now - self._quick_at[i] >= SLOW_S:
+                self._quick_at[i] = now
+                rows.append(i)
         return rows
+
+    def _is_slow(self, i: int, round_trip_s: float) -> bool:
+        """Whether this is slow for a link, and slower than the guard counts on for this vehicle."""
+        if round_trip_s <= SLOW_ROUND_TRIP_S:
+            return False
+        return round_trip_s > float(self._world.fleet[i]["latency"]) + SLOWER_BY_S
 
     def overdue(self, now: float) -> list[int]:
         """While all return: rows of those that should be home by now and still fly our setpoints."""

@@ -251,29 +251,35 @@ class Swarm:
         self._mind_the_others(why, now)
 
     def _read_telemetry(self, now: float) -> None:
-        for i, session in enumerate(self._sessions):
+        rows = []
+        for session in self._sessions:
             t = session.telemetry
             age = now - t.received_at + t.age_s if t.positioned else 0.0
-            self._wire[i] = (t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age)
+            rows.append((t.lat_e7, t.lon_e7, t.height_m, t.v_east, t.v_north, t.v_up, age))
+        self._wire[:] = rows
         self.roster.look()
         calls.read_poses(self._wire, self._world.poses, *self._origin)
 
     def _go_on(self, k: int, now: float) -> None:
         """Move on to the next part of the flight when everybody is ready for it."""
-        active = self.roster.active
         if self.part is Part.PREPARING:
             self._await_ready(now)
         elif self.part is Part.TAKING_OFF:
-            for session in active:
-                if session.phase is Phase.HOLDING:
-                    session.engage()
-            if active and all(session.phase is Phase.ENGAGED for session in active):
-                self._begin_search(k, now)
+            self._engage(k, now)
         elif self.part is Part.SEARCHING and not self._anybody_searches():
             self.part = Part.RETURNING
-        ends = self.part in (Part.RETURNING, Part.WATCHING) or not self.roster.active
+        ends = self.part in (Part.RETURNING, Part.WATCHING) or self.roster.empty
         if ends and self.part is not Part.OVER and not self.roster.anybody_flies_for_us:
             self._watch(now)
+
+    def _engage(self, k: int, now: float) -> None:
+        """Take control of those that are up; when all are, the search begins."""
+        active = self.roster.active
+        for session in active:
+            if session.phase is Phase.HOLDING:
+                session.engage()
+        if active and all(session.phase is Phase.ENGAGED for session in active):
+            self._begin_search(k, now)
 
     def _watch(self, now: float) -> None:
         """None of ours is in the air: the flight is over when nobody is, or after a while."""
@@ -327,28 +333,28 @@ class Swarm:
 
     def _follow_stages(self) -> None:
         """Stages that firmware flies follow the session; those that the loop flies are the loop's own."""
-        errands = self._world.errands
-        for i, session in enumerate(self._sessions):
-            stage = STAGE_OF.get(session.phase)
-            if stage is not None:
-                errands[i]["stage"] = stage
-            elif session.phase in GONE:
-                errands[i]["stage"] = stages.ADRIFT if self.roster.aloft(i) else stages.GROUND
-            elif session.phase is Phase.ENGAGED and errands[i]["stage"] == stages.LAND:
+        stage = self._world.errands["stage"]
+        for i, (session, was) in enumerate(zip(self._sessions, stage.tolist(), strict=True)):
+            if session.phase is not Phase.ENGAGED:
+                stage[i] = self._stage_in_firmware(i, session.phase, was)
+            elif was == stages.LAND:
                 session.land()
-            elif session.phase is Phase.ENGAGED:
+            elif was == stages.ADRIFT or self.roster.dropped[i] == "released":
                 self._rejoin(i)
+
+    def _stage_in_firmware(self, i: int, phase: Phase, was: int) -> int:
+        """The stage of a vehicle that does not fly our setpoints."""
+        if phase in GONE:
+            return stages.ADRIFT if self.roster.aloft(i) else stages.GROUND
+        return STAGE_OF.get(phase, was)
 
     def _rejoin(self, i: int) -> None:
         """A vehicle that was silent or released obeys again: it does what the others do."""
-        stage = self._world.errands["stage"]
         if self.roster.dropped[i] == "released":
             self._released.discard(i)
             self.roster.take_back(i)
-        elif stage[i] != stages.ADRIFT:
-            return
         waits = self.held or self.part is Part.TAKING_OFF
-        stage[i] = stages.HOLD if waits else stages.SEARCH
+        self._world.errands["stage"][i] = stages.HOLD if waits else stages.SEARCH
         self._world.orders[i] = self.part is Part.RETURNING
 
     def _plan(self, tick: int, now: float) -> None:
@@ -372,7 +378,7 @@ class Swarm:
         """Homing and guard for everybody, and the setpoints to those that take them."""
         world = self._world
         self._journal.before_steering()
-        if world.orders.any():
+        if any(world.orders.tolist()):
             world.begin_return(now)
         world.steer(now)
         self._journal.after_steering(k, now)

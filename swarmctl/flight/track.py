@@ -23,7 +23,9 @@ class Track:
             self._times = np.concatenate((self._times, np.zeros_like(self._times)))
             self._poses = np.concatenate((self._poses, np.zeros_like(self._poses)))
         self._times[self._size] = now
-        self._poses[self._size] = poses
+        self._poses[self._size].view(np.float64)[:] = poses.view(
+            np.float64
+        )  # field by field takes ten times as long
         self._size += 1
 
     @property

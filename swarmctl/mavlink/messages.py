@@ -1,12 +1,14 @@
 """The frequent messages as typed tuples, in wire order, and what is needed to pack and unpack them.
 
-Field names, units and values are pymavlink's own, and so are the struct and the checksum seed of each
+Field names, units and values are pymavlink's own, and so are the types and the checksum seed of each
 message: nothing about the wire format is written down a second time.  The order of the fields is the one
 on the wire (large types first), which is what lets a payload be unpacked straight into the tuple; the
 dialect is asked at import whether that still holds.
 """
 
 import struct
+from collections.abc import Sequence
+from itertools import islice
 from typing import Any, NamedTuple
 
 from .dialect import mav
@@ -110,6 +112,82 @@ class SetPositionTargetLocalNed(NamedTuple):
     coordinate_frame: int
 
 
+class Timesync(NamedTuple):
+    """TIMESYNC: nanoseconds by the clock of who answers, 0 in a question, and of who asked."""
+
+    tc1: int
+    ts1: int
+
+
+class HomePosition(NamedTuple):
+    """HOME_POSITION: degrees × 1e7, mm above sea level, the place in the vehicle's own frame (m)."""
+
+    latitude: int
+    longitude: int
+    altitude: int
+    x: float
+    y: float
+    z: float
+    q: Sequence[float]
+    approach_x: float
+    approach_y: float
+    approach_z: float
+    time_usec: int
+
+
+class BatteryStatus(NamedTuple):
+    """BATTERY_STATUS: mAh, hJ, 0.01 degrees Celsius, mV of each cell, 0.01 A, percent."""
+
+    current_consumed: int
+    energy_consumed: int
+    temperature: int
+    voltages: Sequence[int]
+    current_battery: int
+    id: int
+    battery_function: int
+    type: int
+    battery_remaining: int
+    time_remaining: int = 0
+    charge_state: int = 0
+    voltages_ext: Sequence[int] = (0, 0, 0, 0)
+    mode: int = 0
+    fault_bitmask: int = 0
+
+
+class SystemTime(NamedTuple):
+    """SYSTEM_TIME: µs since 1970, ms since boot."""
+
+    time_unix_usec: int
+    time_boot_ms: int
+
+
+class EstimatorStatus(NamedTuple):
+    """ESTIMATOR_STATUS: how well the vehicle's estimate fits what it measures, and what it is good for."""
+
+    time_usec: int
+    vel_ratio: float
+    pos_horiz_ratio: float
+    pos_vert_ratio: float
+    mag_ratio: float
+    hagl_ratio: float
+    tas_ratio: float
+    pos_horiz_accuracy: float
+    pos_vert_accuracy: float
+    flags: int
+
+
+class Vibration(NamedTuple):
+    """VIBRATION: levels by axis, and how often each accelerometer clipped."""
+
+    time_usec: int
+    vibration_x: float
+    vibration_y: float
+    vibration_z: float
+    clipping_0: int
+    clipping_1: int
+    clipping_2: int
+
+
 class HotMessage(NamedTuple):
     """How to pack and unpack one frequent message."""
 
@@ -117,15 +195,38 @@ class HotMessage(NamedTuple):
     fields: type[Any]
     payload: struct.Struct
     crc_extra: bytes
+    lengths: tuple[int, ...]
+    """How many values of the payload each field has; empty if each has one."""
+
+    def grouped(self, values: tuple[Any, ...]) -> list[Any]:
+        """One value for each field: an array is a list, as in pymavlink's messages."""
+        rest = iter(values)
+        return [list(islice(rest, length)) if length > 1 else next(rest) for length in self.lengths]
+
+    def flat(self, values: tuple[Any, ...]) -> list[Any]:
+        """The inverse."""
+        flat: list[Any] = []
+        for value, length in zip(values, self.lengths, strict=True):
+            flat += value if length > 1 else (value,)
+        return flat
 
 
 def _hot(fields: type[Any]) -> HotMessage:
-    """Build from the dialect, which must agree on the order of the fields."""
+    """Build from the dialect, which must agree on the order of the fields; it may have more at the end."""
     for message in mav.mavlink_map.values():
         if message.msgname.replace("_", "") == fields.__name__.upper():
-            if tuple(message.ordered_fieldnames) != fields._fields:
+            count = len(fields._fields)
+            if tuple(message.ordered_fieldnames[:count]) != fields._fields:
                 raise TypeError(f"{message.msgname}: the installed pymavlink has other fields than {fields}")
-            return HotMessage(message.id, fields, message.unpacker, bytes([message.crc_extra]))
+            lengths, codes = tuple(message.lengths[:count]), message.native_format.decode()[1 : count + 1]
+            payload = "<" + "".join(f"{n}{code}" for n, code in zip(lengths, codes, strict=True))
+            return HotMessage(
+                message.id,
+                fields,
+                struct.Struct(payload),
+                bytes([message.crc_extra]),
+                lengths if sum(lengths) > count else (),
+            )
     raise TypeError(f"the installed pymavlink has no message {fields.__name__}")
 
 
@@ -147,5 +248,7 @@ HOT_MESSAGES = {
         SET_POSITION_TARGET_LOCAL_NED,
         SYS_STATUS,
         EXTENDED_SYS_STATE,
+        *map(_hot, (Timesync, HomePosition, BatteryStatus, SystemTime, EstimatorStatus, Vibration)),
     )
 }
+BY_FIELDS = {hot.fields: hot for hot in HOT_MESSAGES.values()}

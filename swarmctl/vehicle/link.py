@@ -103,7 +103,7 @@ class Link:
         self._traffic.append(frame)
 
     def send_message(self, message: Any) -> None:
-        """Queue a pymavlink message."""
+        """Queue a message, as the encoder takes it."""
         self.send(self.encoder.encode(message))
 
     def send_heartbeat(self) -> None:

@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.messages import Timesync
 
 from .link import Link
 
@@ -64,11 +64,11 @@ class Tally:
         self._setpoint_at = math.nan
         self._unanswered: deque[int] = deque(maxlen=PINGS_KEPT)
 
-    def ping(self, now: float) -> Any:
+    def ping(self, now: float) -> Timesync:
         """The TIMESYNC whose answer measures a round trip."""
         stamp = round(now * NANOSECONDS)
         self._unanswered.append(stamp)
-        return mav.MAVLink_timesync_message(0, stamp)
+        return Timesync(0, stamp)
 
     def pong(self, fields: Any, now: float) -> bool:
         """A TIMESYNC came: the answer to one of the last pings, or something else, which is ignored."""

@@ -1,5 +1,6 @@
 """What one vehicle last said of itself, in SI units and an east-north-up frame."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,9 +28,9 @@ class Telemetry:
     v_east: float = 0.0  #: m/s
     v_north: float = 0.0
     v_up: float = 0.0
-    received_at: float = float("-inf")
+    received_at: float = -math.inf
     age_s: float = 0.0  #: how old that position was then, beyond the least that any took to come
-    clock_offset_s: float = float("inf")  #: the caller's clock less the vehicle's, by the quickest position
+    clock_offset_s: float = math.inf  #: the caller's clock less the vehicle's, by the quickest position
     boot_ms: int = 0  #: the vehicle's own clock at that position
     armed: bool = False
     mode: int = -1  #: HEARTBEAT.custom_mode; -1 before the first
@@ -44,11 +45,11 @@ class Telemetry:
     @property
     def positioned(self) -> bool:
         """Whether a valid position has come."""
-        return self.received_at > float("-inf")
+        return self.received_at > -math.inf
 
     def forget_clock(self) -> None:
         """The vehicle's clock was set anew."""
-        self.clock_offset_s, self.age_s = float("inf"), 0.0
+        self.clock_offset_s, self.age_s = math.inf, 0.0
 
     def forget(self) -> None:
         """Forget all but mode and arming, which every heartbeat tells: the vehicle may have restarted."""

@@ -43,7 +43,8 @@ def test_two_hear_each_other_within_the_shorter_of_their_ranges(
     expected = [
         [
             j for j, (bx, by, their_reach) in enumerate(vehicles)
-            if j != i and (bx - ax) * (bx - ax) + (by - ay) * (by - ay) <= min(reach, their_reach) ** 2
+            if j != i and min(reach, their_reach) > 0.0
+            and (bx - ax) * (bx - ax) + (by - ay) * (by - ay) <= min(reach, their_reach) ** 2
         ]
         for i, (ax, ay, reach) in enumerate(vehicles)
     ]  # fmt: skip
@@ -53,6 +54,16 @@ def test_two_hear_each_other_within_the_shorter_of_their_ranges(
 def test_a_vehicle_exactly_at_the_range_is_heard() -> None:
     assert hears(world([(0.0, 0.0), (360.0, 480.0)])) == [[1], [0]]
     assert hears(world([(0.0, 0.0), (360.0, 480.1)])) == [[], []]
+
+
+@pytest.mark.parametrize("count", [3, 60])
+def test_a_radio_of_range_0_is_off_even_on_the_same_spot(count: int) -> None:
+    """By pairs and by cells."""
+    w = world([(5.0, 5.0)] * count)
+    w.fleet["radio_range"][0] = 0.0
+    heard = hears(w)
+    assert heard[0] == []
+    assert heard[1:] == [[j for j in range(1, count) if j != i] for i in range(1, count)]
 
 
 def test_loss_is_each_receivers_own_and_new_every_tick() -> None:

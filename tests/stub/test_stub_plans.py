@@ -5,6 +5,7 @@ A MAVSDK client needs its row "fence, rally" of both.
 
 import math
 from collections.abc import Callable
+from random import Random
 from typing import Any
 
 import pytest
@@ -205,6 +206,18 @@ class TestShapes:
         near, far = Circle(0.0, 0.0, 10.0), Circle(30.0, 0.0, 10.0)
         fence = Fence([Zone(near, True), Zone(far, True), Zone(Circle(0.0, 0.0, 3.0), False)])
         assert [fence.broken_at(east, 0.0) for east in (1.0, 5.0, 15.0, 25.0)] == [True, False, True, False]
+
+    def test_asking_along_a_way_gives_what_asking_afresh_does(self) -> None:
+        zones = [Zone(self.L_SHAPE, True), Zone(Circle(5.0, 5.0, 2.0), False)]
+        held = Fence(zones)
+        dice = Random(1)
+        east, north, broken = 1.0, 1.0, []
+        for _ in range(3000):  # from side to side of the L, steps of a metre or less
+            east = min(max(east + dice.uniform(-1.0, 1.0), -5.0), 35.0)
+            north = min(max(north + dice.uniform(-1.0, 1.0), -5.0), 35.0)
+            broken.append(held.broken_at(east, north))
+            assert broken[-1] is Fence(zones).broken_at(east, north)
+        assert 500 < sum(broken) < 2500
 
 
 @pytest.mark.row("px4-fence")
