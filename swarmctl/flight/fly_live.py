@@ -35,8 +35,8 @@ REPORT_S = 0.5
 """Wall time between two reports."""
 STUB_LATENCY_S = 0.1
 """From a position's measurement to the setpoint's effect, on stubs of this machine."""
-UNSURE_S, UNSURE_OF_STUBS_S = 0.25, 0.05
-"""So well is the time known after which a vehicle acts; the guard keeps what the fastest one flies in it besides."""
+UNSURE_OF_STUBS_S = 0.05
+"""So well is the time known after which a stub of ours acts; the guard keeps what the fastest one flies in it besides."""
 INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal (SIGHUP) must not leave vehicles in the air any more than Ctrl-C."""
 
@@ -126,8 +126,7 @@ async def _fly_prepared(
     scenario = Scenario(mission, ideal=False, stands=as_found)
     world = scenario.world(seed)
     describe_vehicles(world.fleet, sessions, options.own_stubs)
-    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
-    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
+    world.rules["separation"] += unsure_m(world.fleet, sessions, options.own_stubs)
     text = f"# Flown with --seed {seed}.\n" + dump(mission)
     folder.write_text(folder.mission, text)
     journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
@@ -154,6 +153,13 @@ def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:
     """
     told = [place_en(mission, s) for s in sessions if s.telemetry.positioned]
     return np.array([place_en(mission, s) if s.telemetry.positioned else told[0] for s in sessions])
+
+
+def unsure_m(fleet: Records, sessions: Sequence[Session], own: bool) -> float:
+    """How much more than the separation the guard keeps, because nobody knows better how vehicles stop."""
+    adapters = [session.adapter for session in sessions]
+    unsure_s = [UNSURE_OF_STUBS_S if own or a is None else a.limits.unsure_s for a in adapters]
+    return float(max(fleet["speed"] * np.array(unsure_s)))
 
 
 def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) -> None:

@@ -44,12 +44,14 @@ class Limits:
     """How the vehicle comes from its speed to standstill, for the guard, which must never be too hopeful.
 
     After ``latency_s`` it follows a velocity with a first-order lag of ``lag_s``, and gets slower by
-    ``braking_mps2`` at most (core/motion.py).
+    ``braking_mps2`` at most (core/motion.py).  ``unsure_s``: what it flies in so long, the guard keeps besides:
+    the time after which it acts is not known any better, nor where it creeps to at the end.
     """
 
     braking_mps2: float
     latency_s: float
-    lag_s: float = 0.0
+    lag_s: float
+    unsure_s: float
 
 
 class Adapter(Protocol):
