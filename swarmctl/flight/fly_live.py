@@ -36,7 +36,7 @@ REPORT_S = 0.5
 STUB_LATENCY_S = 0.1
 """From a position's measurement to the setpoint's effect, on stubs of this machine."""
 UNSURE_OF_STUBS_S = 0.05
-"""So well is the time known after which a stub of ours acts; the guard keeps what the fastest one flies in it besides."""
+"""So well is the time known after which a stub of ours acts: what it flies in it, the guard keeps besides."""
 INTERRUPTIONS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal (SIGHUP) must not leave vehicles in the air any more than Ctrl-C."""
 

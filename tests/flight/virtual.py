@@ -31,6 +31,8 @@ T = TypeVar("T")
 STEP_S = 0.05
 LONGEST_S = 3600.0
 """Virtual seconds after which a flight that has not ended has failed."""
+SLOW_MPS = 10.0
+"""Bare stubs have their firmware's own limits, and no more may be asked of them."""
 PLACES_M = ((60.0, 60.0), (100.0, 60.0), (60.0, 100.0))
 ANYWHERE = Address("udpin", "127.0.0.1", 14540)
 
@@ -174,7 +176,10 @@ class Live:
     def fly(self) -> Outcome:
         """Fly it to its end.  Raises what the flight raises, TimeoutError if it does not end."""
         mission = as_found(
-            small_mission(self.path, {"vehicles.count": len(self.autopilots), **self.settings})
+            small_mission(
+                self.path,
+                {"vehicles.count": len(self.autopilots), "vehicles.speed_mps": SLOW_MPS, **self.settings},
+            )
         )
         self.folder.path.mkdir()
         options = LiveOptions(
