@@ -138,7 +138,9 @@ async def measure(options: argparse.Namespace) -> None:
     session.engage()
     await phase(link, session, Phase.ENGAGED)
     pilot = Pilot(link, session, options.altitude)
-    acceleration = min(told.get("acceleration_mps2", math.inf), 4.0)
+    acceleration = session.adapter.limits.acceleration_mps2 or min(
+        told.get("acceleration_mps2", math.inf), 4.0
+    )
     print(f"{'asked':>6} {'speed':>6} {'way':>7} {'assumed':>8}  kept {'stood':>6} {'began':>6} {'late':>6}")
     for speed in map(float, options.speeds.split(",")):
         for way in (1.0, -1.0):

@@ -170,7 +170,8 @@ def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) ->
             continue
         limits, told = session.adapter.limits, session.parameters
         row["speed"] = min(float(row["speed"]), told.get("speed_mps", np.inf))
-        row["acceleration"] = min(float(row["acceleration"]), told.get("acceleration_mps2", np.inf))
+        obeyed = min(float(row["acceleration"]), told.get("acceleration_mps2", np.inf))
+        row["acceleration"] = limits.acceleration_mps2 or obeyed
         row["braking"] = min(float(row["acceleration"]), limits.braking_mps2)
         row["lag"] = limits.lag_s
         row["climb"] = min(float(row["climb"]), told.get("climb_mps", np.inf))

@@ -64,7 +64,7 @@ class Session(Machine):
             self._heard_at = now
             if frame.message_id == GLOBAL_POSITION_INT:
                 booted_ms = self.telemetry.boot_ms
-                read_position(self.telemetry, frame.fields, now)
+                read_position(self.telemetry, frame.fields, now, self._tally.longest_way_s(now))
                 if self.telemetry.boot_ms < booted_ms - RESTART_MS:
                     self.telemetry.forget_clock()
                     self._restarted()

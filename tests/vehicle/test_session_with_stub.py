@@ -172,3 +172,14 @@ def test_a_vehicle_that_is_turned_and_turned_is_not_astray(autopilot: str) -> No
         flight.command(10.0 * math.sin(heading), 10.0 * math.cos(heading))
         flight.run((0.5, 1.0, 1.0, 3.0, 12.0)[k % 5])
     assert flight.texts(EventKind.ASTRAY) == []
+
+
+def test_a_simulators_slow_clock_is_not_taken_for_a_slow_link() -> None:
+    """Its computer is busy: the vehicle's time falls behind by a second in twenty, the link does not."""
+    flight = StubFlight("px4", speed=0.95)
+    flight.until_phase(Phase.READY)
+    ages = []
+    for _ in range(600):
+        flight.run(0.1)
+        ages.append(flight.session.telemetry.age_s)
+    assert max(ages) < 0.25

@@ -44,7 +44,8 @@ class Limits:
     """How the vehicle comes from its speed to standstill, for the guard, which must never be too hopeful.
 
     After ``latency_s`` it follows a velocity with a first-order lag of ``lag_s``, and gets slower by
-    ``braking_mps2`` at most (core/motion.py).  ``unsure_s``: what it flies in so long, the guard keeps besides:
+    ``braking_mps2`` at most (core/motion.py), faster by as much as its parameters or ``acceleration_mps2`` say,
+    where it heeds no limit.  ``unsure_s``: what it flies in so long, the guard keeps besides:
     the time after which it acts is not known any better, nor where it creeps to at the end.
     """
 
@@ -52,6 +53,7 @@ class Limits:
     latency_s: float
     lag_s: float
     unsure_s: float
+    acceleration_mps2: float | None = None
 
 
 class Adapter(Protocol):

@@ -58,9 +58,9 @@ MODES = Modes(
     },
 )
 
-# Measured on v1.17 (benchmarks/stopping.py): its velocity controller follows with a lag, and what its integrator has
-# gathered against the drag lets it creep on for seconds.
-LIMITS = Limits(braking_mps2=3.0, latency_s=0.6, lag_s=1.3, unsure_s=0.5)
+# Measured on v1.17 (benchmarks/stopping.py): its velocity controller heeds no acceleration but what its tilt allows,
+# follows with a lag, and what its integrator has gathered against the drag lets it creep on for seconds.
+LIMITS = Limits(braking_mps2=8.0, latency_s=0.4, lag_s=1.3, unsure_s=0.5, acceleration_mps2=8.0)
 
 QUANTITIES: tuple[Quantity, ...] = (
     Quantity("speed_mps", {"MPC_XY_VEL_MAX": 1.0}),
