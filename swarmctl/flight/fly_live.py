@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
+from swarmctl.mavlink.signing import Signing
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
@@ -55,7 +56,8 @@ class LiveOptions:
     adapt: bool = False  #: lower what the mission asks to what the vehicles can do, and set their parameters
     confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
     watching: Watching = lambda now, sessions: None
-    wires: Callable[[], Wires] = field(default=Switchboard)
+    signing: Signing | None = None  #: signs what is sent; what is not signed is not believed
+    wires: Callable[[Signing | None], Wires] = field(default=Switchboard)
 
 
 async def fly_live(
@@ -106,11 +108,11 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
             raise StoppedError("stopped before anything was armed")
         options.watching(now, sessions)
 
-    return LiveLink(FlightClock(options.speed), options.wires(), look)
+    return LiveLink(FlightClock(options.speed), options.wires(options.signing), look, options.signing)
 
 
 async def _prepared(mission: Mission, link: LiveLink, options: LiveOptions) -> Preparation:
-    await link.connect(options.addresses, session_settings(mission), options.connect_timeout_s)
+    link.meet(await link.find(options.addresses, options.connect_timeout_s), session_settings(mission))
     preparation = Preparation(mission, link.sessions, link.clock.now())
     await link.prepare(preparation)
     return preparation
