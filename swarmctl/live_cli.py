@@ -72,7 +72,7 @@ def fly_connected(
     confirm = None if sure else lambda preparation: confirm_typed(preparation, progress)
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
-        watching=progress.preparing, adapt=adapt, signing=reach.signing(progress),
+        watching=progress.preparing, adapt=adapt, signing=reach.signing(progress), telling=progress.say,
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
@@ -81,7 +81,7 @@ def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Pr
     """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError, SigningKeyError."""
     options = LiveOptions(
         addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing,
-        signing=reach.signing(progress),
+        signing=reach.signing(progress), telling=progress.say,
     )  # fmt: skip
     preparation, ways = asyncio.run(probe(mission, options, orders))
     rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))

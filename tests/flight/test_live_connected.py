@@ -170,7 +170,7 @@ def test_serial_lines(start: Start, tmp_path: Path) -> None:
     code, summary = flown(
         start(
             "swarmctl", "fly", "--mission", write(tmp_path, MISSION + GROUP), "--yes", "--json", "--speed", SPEED,
-            *(word for path in paths for word in ("--connect", f"serial://{path}:57600")), "--out", tmp_path / "run",
+            *(word for path in paths for word in ("--connect", f"serial://{path}:921600")), "--out", tmp_path / "run",
         )
     )  # fmt: skip
     assert (code, [v["outcome"] for v in summary["per_vehicle"]]) == (0, ["landed"] * 2)

@@ -71,7 +71,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("return_height_m", {"RTL_RETURN_ALT": 1.0}),
 )
 
-# What the onboard link carries often, or at every change of mode, without being asked.
+# What the onboard link carries often, or at every change of mode, without being asked, and what a thin link feels.
 UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_ATTITUDE,
     mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -87,6 +87,10 @@ UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_HIGHRES_IMU,
     mav.MAVLINK_MSG_ID_ALTITUDE,
     mav.MAVLINK_MSG_ID_ODOMETRY,
+    mav.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mav.MAVLINK_MSG_ID_BATTERY_STATUS,
+    mav.MAVLINK_MSG_ID_VIBRATION,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME,
     CURRENT_MODE,
 )
 
