@@ -34,7 +34,7 @@ class KeyGiver:
         self._board.subscribe(self._arrived)
         self._verifier = Verifier(signing)
         self._encoder = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
-        self._signs: dict[int, bool] = {}
+        self._last: dict[int, Verdict] = {}
 
     async def find(self, addresses: Sequence[Address], timeout_s: float) -> list[int]:
         """Open the addresses and listen; the system ids of all vehicles there.  Raises RefusedError for none."""
@@ -51,7 +51,7 @@ class KeyGiver:
     async def give(self, key: bytes | None) -> dict[int, bool]:
         """Give every vehicle the key, or take it away; whether each now does as it was told."""
         secret, time = (key, self._signing.now) if key else (bytes(KEY_BYTES), 0)
-        self._signs.clear()
+        self._last.clear()
         for _ in range(TRIES):
             for system in self._left(key):
                 message = mav.MAVLink_setup_signing_message(system, AUTOPILOT_COMPONENT, list(secret), time)
@@ -64,8 +64,9 @@ class KeyGiver:
         self._board.close()
 
     def _left(self, key: bytes | None) -> list[int]:
-        """Those that do not sign as they should."""
-        return [system for system in self._board.heard if self._signs.get(system) is not (key is not None)]
+        """Those whose last frame does not show that they did as they were told."""
+        wanted = (Verdict.GOOD, Verdict.REPLAYED) if key else (Verdict.UNSIGNED,)
+        return [system for system in self._board.heard if self._last.get(system) not in wanted]
 
     async def _call_until(self, met: Callable[[], bool], limit_s: float) -> None:
         loop = asyncio.get_running_loop()
@@ -81,4 +82,4 @@ class KeyGiver:
     def _arrived(self, system: int, data: bytes) -> None:
         for frame in Decoder().feed(data):
             if frame.component == AUTOPILOT_COMPONENT:
-                self._signs[system] = self._verifier.judge(frame.raw) in (Verdict.GOOD, Verdict.REPLAYED)
+                self._last[system] = self._verifier.judge(frame.raw)

@@ -71,13 +71,17 @@ def test_ardupilot_is_given_a_key_and_rid_of_it_and_px4_is_said_to_take_none(
 ) -> None:
     port = free_ports(3)
     stubs("--port", port, "--autopilot", "ardupilot,px4", "--shared")
-    words = ("--connect", f"udpin://127.0.0.1:{port}", "--signing-key", key)
-    for extra, typed, said in (
-        ((), "no\n", ""),
-        ((), "yes\n", "vehicle 1: it signs with this key\nvehicle 2: it does not do so\n"),
-        (("--yes",), "", "vehicle 1: it signs with this key\nvehicle 2: it does not do so\n"),
-        (("--remove",), "yes\n", "vehicle 1: it signs no more\nvehicle 2: it signs no more\n"),
+    words = ("--connect", f"udpin://127.0.0.1:{port}", "--signing-key")
+    other = tmp_path / "other"
+    other.write_text("ab" * 32)
+    given = "vehicle 1: it signs with this key\nvehicle 2: it does not do so\n"
+    for words_now, typed, said, code in (
+        ((key,), "no\n", "", 3),
+        ((key,), "yes\n", given, 3),
+        ((key, "--yes"), "", given, 3),
+        ((other, "--remove"), "yes\n", "vehicle 1: it does not do so\nvehicle 2: it signs no more\n", 3),
+        ((key, "--remove"), "yes\n", "vehicle 1: it signs no more\nvehicle 2: it signs no more\n", 0),
     ):
-        sign = start("swarmctl", "sign", *words, *extra)
+        sign = start("swarmctl", "sign", *words, *words_now)
         out, err = sign.communicate(typed, timeout=PATIENCE_S)
-        assert (out, sign.returncode) == (said, 0 if "--remove" in extra else 3), err
+        assert (out, sign.returncode) == (said, code), err
