@@ -7,6 +7,7 @@ import pytest
 
 from swarmctl.flight.budget import Load, Rates, lowered, plan, stale_s
 from swarmctl.flight.errors import RefusedError
+from swarmctl.flight.fly_live import UNSURE_S
 from swarmctl.mavlink.signing import Signing, units
 from swarmctl.mission.model import Mission
 from swarmctl.vehicle.addresses import Address
@@ -132,6 +133,10 @@ def test_a_flight_stays_within_its_lines_budget(
     budget = plan(small_mission(tmp_path), [line] * len(autopilots), signed, 1.0)
     assert (budget.rates, told) == (rates, [str(budget)])
     assert outcome.mission.setpoints.rate_hz == rates.setpoints
+    world, stale = outcome.world, stale_s(rates)
+    assert world.fleet["latency"].min() >= 0.3 + stale, "ArduPilot's own, the less of the two"
+    unsure_m = (UNSURE_S + stale) * float(world.fleet["speed"].max())
+    assert world.rules["separation"] == pytest.approx(outcome.mission.safety.separation_m + unsure_m)
     (load,), wires = budget.loads, live.wires
     assert isinstance(wires, ThinWires)
     began = outcome.swarm.search_began
