@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -60,6 +62,18 @@ def parse_wind(context: click.Context, option: click.Parameter, text: str) -> tu
     if not abs(east) + abs(north) <= STRONGEST_MPS:
         raise click.BadParameter(f"{text!r} is more than {STRONGEST_MPS:g} m/s")
     return east, north
+
+
+def read_key(context: click.Context, option: click.Parameter, path: Path | None) -> bytes | None:
+    """Read the key to sign with."""
+    if path is None:
+        return None
+    from swarmctl.mavlink.signing import parse_key
+
+    try:
+        return parse_key(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise click.BadParameter(f"{path}: {error}") from None
 
 
 GROUND_STATIONS = """
@@ -159,6 +173,14 @@ Over UDP a vehicle answers the first who speaks to it, and nobody else.
     help="Let something fail T s after boot, as [ID:]NAME[=VALUE]@T[+SECONDS]; may be given again. "
     f"NAME: {', '.join(FAULTS)}.",
 )
+@click.option(
+    "--signing-key",
+    "key",
+    callback=read_key,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Sign every frame, and drop and count what is not: 64 hex digits, base64 or 32 raw bytes.",
+)
 def main(
     vehicles: int,
     autopilots: list[str],
@@ -173,6 +195,7 @@ def main(
     wind: tuple[float, float],
     seed: int | None,
     faults: tuple[str, ...],
+    key: bytes | None,
 ) -> None:
     """Play multicopters that speak MAVLink 2, until Ctrl-C."""
     if len(autopilots) not in (1, vehicles):
@@ -188,7 +211,7 @@ def main(
     from . import links
 
     each = autopilots * vehicles if len(autopilots) == 1 else autopilots
-    fleet = make_fleet(each, home, wind, seed, faults)
+    fleet = make_fleet(each, home, wind, seed, faults, key)
     opener, where, first = choose_links(port, own_port, shared, ports, tcp, pty)
     click.echo(
         f"{vehicles} {', '.join(dict.fromkeys(autopilots))} vehicle(s): {where}; Ctrl-C ends.", err=True
@@ -196,6 +219,7 @@ def main(
     try:
         with contextlib.suppress(KeyboardInterrupt):
             asyncio.run(links.serve(fleet, opener, speed))
+        tell_refused(fleet)
     except OSError as error:
         raise click.UsageError(f"cannot use the ports from {first} on: {error.strerror}") from None
 
@@ -206,14 +230,16 @@ def make_fleet(
     wind: tuple[float, float],
     seed: int | None,
     faults: tuple[str, ...],
+    key: bytes | None,
 ) -> "StubFleet":
     """The vehicles, and what is to go wrong with them; raises BadParameter for a fault that cannot be."""
     from .fleet import StubFleet
 
     pads = [(SPACING_M * index, 0.0) for index in range(len(autopilots))]
     fleet = StubFleet(
-        len(autopilots), origin=home, pads_m=pads, autopilot=autopilots, wind_mps=wind, seed=seed
-    )
+        len(autopilots), origin=home, pads_m=pads, autopilot=autopilots, wind_mps=wind, seed=seed,
+        key=key, date_s=time.time(),
+    )  # fmt: skip
     try:
         for fault in faults:
             fleet.order(parse_order(fault))
@@ -251,6 +277,15 @@ def check_udp_ports(vehicles: int, port: int, ports: int, own_port: int) -> None
             f"--vehicles {vehicles} would send from UDP ports that others send to, from {own_port} on: "
             "use --shared, --ports, --from, --tcp or --pty"
         )
+
+
+def tell_refused(fleet: "StubFleet") -> None:
+    """What each vehicle dropped for its signature, of those that dropped anything."""
+    for vehicle in fleet.vehicles:
+        refused = vehicle.keyring.refused
+        if any(refused.values()):
+            counts = ", ".join(f"{count} {verdict.value}" for verdict, count in refused.items())
+            click.echo(f"vehicle {vehicle.system} dropped {counts}", err=True)
 
 
 def say_terminal(system: int, path: str) -> None:

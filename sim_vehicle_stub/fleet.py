@@ -8,6 +8,7 @@ depend on how often `advance` is called.
 import heapq
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from random import Random
 from typing import Any
@@ -39,8 +40,10 @@ class StubFleet:
     ground.  ``pads_m``: (V, 2) metres east and north of it, where the vehicles stand.  ``limits``: one for
     all, or one each; None: the firmware's own.  ``autopilot``: one for all, or one each.  ``wind_mps``: east
     and north.  ``seed``: altitudes and local origins scatter by it as they do between real vehicles, and the
-    network's dice are thrown by it; None: nothing scatters.  ``now``: the time of boot in seconds.  Raises
-    ValueError for an autopilot that cannot be played, or pads, limits or autopilots that are not one a vehicle.
+    network's dice are thrown by it; None: nothing scatters.  ``now``: the time of boot in seconds.  ``key``: what
+    all sign with and demand of others, ``date_s`` (seconds since 1970) being their date at time zero; None: nobody
+    does.  Raises ValueError for an autopilot that cannot be played, or pads, limits or autopilots that are not one
+    a vehicle.
     """
 
     def __init__(
@@ -55,6 +58,8 @@ class StubFleet:
         seed: int | None = None,
         now: float = 0.0,
         step_s: float = STEP_S,
+        key: bytes | None = None,
+        date_s: float = 0.0,
     ) -> None:
         each_limits = [limits] * count if limits is None or isinstance(limits, Limits) else list(limits)
         autopilots = [autopilot] * count if isinstance(autopilot, str) else list(autopilot)
@@ -73,6 +78,7 @@ class StubFleet:
         self._rows[:, :2] = pads_m
         self._origin = origin
         self._boot = now
+        self._key, self._date_s = key, date_s
         self._step_s = step_s
         self._steps = 0
         self._to_come: list[tuple[float, int, Callable[[], None]]] = []
@@ -83,13 +89,15 @@ class StubFleet:
 
     def _vehicle(self, index: int, autopilot: str, limits: Limits | None, seed: int | None) -> StubVehicle:
         """The vehicle of one row."""
-        surroundings = Surroundings(self._origin)
+        surroundings = Surroundings(self._origin, key=self._key, date_s=self._date_s)
         if seed is not None:
             dice = Random(f"{seed} {index}")
             start = (dice.uniform(-START_ERROR_M, START_ERROR_M), dice.uniform(-START_ERROR_M, START_ERROR_M))
             altitude = dice.uniform(-ALTITUDE_ERROR_M, ALTITUDE_ERROR_M)
             height = dice.uniform(-START_ERROR_M, START_ERROR_M)
-            surroundings = Surroundings(self._origin, altitude, (*start, height), seed)
+            surroundings = replace(
+                surroundings, altitude_error_m=altitude, start_error_m=(*start, height), seed=seed
+            )
         self._altitude_errors[index] = surroundings.altitude_error_m
         pilot = Pilot(self._commands, self._limits, index)
         pilot.place = tuple(self._rows[index].tolist())

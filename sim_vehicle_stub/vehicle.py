@@ -20,6 +20,7 @@ from . import commands, file_transfer, parameter_link, telemetry
 from .battery import Battery
 from .faults import Faults
 from .fences import Fence, fence_of
+from .keyring import Keyring
 from .network import Network
 from .parameters import Parameters
 from .personalities.base import Personality
@@ -47,13 +48,16 @@ class Surroundings:
 
     ``origin``: latitude, longitude (degrees) and altitude (m) of the fleet's frame.  ``altitude_error_m``:
     metres by which altitudes above sea level read too high.  ``start_error_m``: east, north and up from where
-    it boots to the origin of its own local frame.  ``seed``: for the network's dice.
+    it boots to the origin of its own local frame.  ``seed``: for the network's dice.  ``key``, ``date_s``: to sign
+    with, and the date at time zero.
     """
 
     origin: tuple[float, float, float]
     altitude_error_m: float = 0.0
     start_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     seed: int = 0
+    key: bytes | None = None
+    date_s: float = 0.0
 
 
 class StubVehicle:
@@ -81,6 +85,7 @@ class StubVehicle:
         self.network: Network = Network(f"{surroundings.seed} {system}")
         self.faults = Faults(self)
         self.plans = Plans(self)
+        self.keyring: Keyring = Keyring(self, surroundings.key, surroundings.date_s)
         self.fence: Fence | None = None
         self._start_error_m = surroundings.start_error_m
         self._kind = kind
@@ -114,7 +119,7 @@ class StubVehicle:
         self.encoder.sequence = 0
         self._at_rest_since: float | None = now
         self._advanced_at = now
-        self._decoder = Decoder()
+        self.listen_with(self.keyring.decoder())
         self._outbox: list[bytes] = []
         self._texts = 0
         self.personality: Personality = self._kind(self)
@@ -135,6 +140,7 @@ class StubVehicle:
         return {
             mav.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: self.personality.setpoint_local,
             mav.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self.personality.setpoint_global,
+            mav.MAVLINK_MSG_ID_SETUP_SIGNING: self.keyring.set_up,
             mav.MAVLINK_MSG_ID_COMMAND_LONG: self._command_long,
             mav.MAVLINK_MSG_ID_COMMAND_INT: self._command_int,
             mav.MAVLINK_MSG_ID_PARAM_REQUEST_READ: partial(parameter_link.read, self),
@@ -160,6 +166,10 @@ class StubVehicle:
         }
 
     # Bytes and time
+
+    def listen_with(self, decoder: Decoder) -> None:
+        """From now on."""
+        self._decoder = decoder
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes off the link; answers are in `outgoing` at once, motion follows at the next tick."""
@@ -202,7 +212,7 @@ class StubVehicle:
 
     def outgoing(self) -> list[bytes]:
         """The frames to send, one a datagram; they are given out once."""
-        frames, self._outbox = self._outbox, []
+        frames, self._outbox = self.keyring.signed(self._outbox), []
         return frames if self.network.perfect else self.network.down(frames, self.now)
 
     @property

@@ -31,6 +31,7 @@ from .options import (
     timeout_option,
 )
 from .paper_cli import paper
+from .sign_cli import sign
 from .study_cli import study
 from .tune_cli import tune
 
@@ -47,6 +48,7 @@ def main() -> None:
 
 main.add_command(fly)
 main.add_command(paper)
+main.add_command(sign)
 main.add_command(study)
 main.add_command(tune)
 

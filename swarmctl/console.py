@@ -31,10 +31,11 @@ def plain_errors() -> Iterator[None]:
     from .record.errors import RecordError
     from .study.errors import StudyError
     from .vehicle.addresses import AddressError
+    from .vehicle.keys import SigningKeyError
 
     try:
         yield
-    except (MissionError, RecordError, StudyError, AddressError) as error:
+    except (MissionError, RecordError, StudyError, AddressError, SigningKeyError) as error:
         say(str(error))
         sys.exit(BAD_INPUT)
     except StoppedError as error:

@@ -15,15 +15,18 @@ from pathlib import Path
 import click
 
 from .dashboard import Progress, findings_table
+from .flight import clock
 from .flight.fly import autopilots, endurance_s
 from .flight.fly_live import LiveOptions, fly_live, probe
 from .flight.orders import Orders
 from .flight.preparation import Preparation
 from .flight.results import Outcome
+from .mavlink.signing import Signing
 from .mission.model import Mission
 from .mission.scenario import Scenario
 from .record.folder import RunFolder
 from .vehicle.addresses import Address, AddressError, parse
+from .vehicle.keys import SigningKeyError, exposure, read_key, signing_with
 
 FIRST_PORT, LAST_PORT = 20000, 28000
 OWN_PORT_OFFSET = 1000
@@ -51,12 +54,21 @@ class Reach:
     backend: str = "mavlink"
     signing_key: Path | None = None
 
+    def signing(self, progress: Progress) -> Signing | None:
+        """What signs and judges frames, if a key was given.  Raises SigningKeyError."""
+        if self.signing_key is None:
+            return None
+        key = read_key(self.signing_key)
+        if trouble := exposure(self.signing_key):
+            progress.say(trouble)
+        return signing_with(key, clock.utc_s)
+
 
 def fly_connected(
     mission: Mission, seed: int, folder: RunFolder, reach: Reach, orders: Orders, progress: Progress, *,
     speed: float, sure: bool, adapt: bool,
 ) -> Outcome:  # fmt: skip
-    """Fly vehicles that are there already.  Raises AddressError for a bad URL."""
+    """Fly vehicles that are there already.  Raises AddressError for a bad URL, SigningKeyError for a bad key."""
 
     def confirm(preparation: Preparation) -> "asyncio.Future[bool]":
         for line in (*preparation.refusals.values(), *preparation.changes, *preparation.troubles):
@@ -65,16 +77,17 @@ def fly_connected(
 
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
-        watching=progress.preparing, adapt=adapt,
+        watching=progress.preparing, adapt=adapt, signing=reach.signing(progress), telling=progress.say,
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
 
 def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Progress) -> bool:
-    """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError."""
+    """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError, SigningKeyError."""
     options = LiveOptions(
-        addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing
-    )
+        addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing,
+        signing=reach.signing(progress), telling=progress.say,
+    )  # fmt: skip
     preparation, ways = asyncio.run(probe(mission, options, orders))
     rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))
     click.echo(findings_table(f"{mission.name}: nothing was armed", rows))
@@ -92,13 +105,23 @@ def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
 
 
 def connects(mission: Mission, reach: Reach) -> bool:
-    """Whether real vehicles are meant.  Raises AddressError for a bad URL, or where only some vehicles have one."""
+    """Whether real vehicles are meant.
+
+    Raises AddressError for a bad URL, or where only some vehicles have one; SigningKeyError for a bad key.
+    """
     for url in reach.urls:
         parse(url)
     named = [vehicle.connect is not None for vehicle in mission.fleet]
     if not reach.urls and any(named) and not all(named):
         raise AddressError("vehicles.connect: some vehicles have one and some have none (or give --connect)")
-    return bool(reach.urls) or all(named)
+    real = bool(reach.urls) or all(named)
+    if reach.signing_key is not None:
+        read_key(reach.signing_key)
+        if not real:
+            raise SigningKeyError(
+                "--signing-key is for vehicles by --connect: stub vehicles in memory sign nothing"
+            )
+    return real
 
 
 def agreed() -> "asyncio.Future[bool]":

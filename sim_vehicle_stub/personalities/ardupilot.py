@@ -63,6 +63,7 @@ class ArduPilot:
     texts_need_gcs = False
     requests_integers = False
     answers_any_component = True
+    TAKES_KEYS = True
     tells_parameter_errors = False
     shows_prearm = True
     no_such_message: int = FAILED

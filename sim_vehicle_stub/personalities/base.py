@@ -38,6 +38,8 @@ class Personality(Protocol):
     requests_integers: bool
     """Whether a plan is asked for with MISSION_REQUEST_INT."""
     answers_any_component: bool
+    TAKES_KEYS: bool
+    """Whether SETUP_SIGNING is understood."""
     tells_parameter_errors: bool
     shows_prearm: bool
     """Whether SYS_STATUS has the pre-arm check among the sensors present and enabled."""

@@ -55,6 +55,7 @@ class Px4:
     texts_need_gcs = True
     requests_integers = True
     answers_any_component = False
+    TAKES_KEYS = False
     tells_parameter_errors = True
     shows_prearm = False
     no_such_message: int = mav.MAV_RESULT_DENIED

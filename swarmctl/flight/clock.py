@@ -9,6 +9,11 @@ def wall_s() -> float:
     return time.perf_counter()
 
 
+def utc_s() -> float:
+    """Seconds since 1970, by a clock that may be wrong and may be set."""
+    return time.time()
+
+
 def today() -> datetime:
     """The local date and time, for naming a run."""
     return datetime.now()

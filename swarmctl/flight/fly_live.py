@@ -4,11 +4,12 @@ import asyncio
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
+from swarmctl.mavlink.signing import Signing
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
@@ -18,6 +19,7 @@ from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.switchboard import Switchboard
 
 from . import clock
+from .budget import Rates, lowered, plan, stale_s
 from .control import ControlServer
 from .errors import RefusedError, StoppedError
 from .fly import Report, about_flight, obey_and_report, session_settings
@@ -55,7 +57,9 @@ class LiveOptions:
     adapt: bool = False  #: lower what the mission asks to what the vehicles can do, and set their parameters
     confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
     watching: Watching = lambda now, sessions: None
-    wires: Callable[[], Wires] = field(default=Switchboard)
+    telling: Callable[[str], None] = lambda text: None  #: told the budget of each wire
+    signing: Signing | None = None  #: signs what is sent; what is not signed is not believed
+    wires: Callable[[Signing | None], Wires] = field(default=Switchboard)
 
 
 async def fly_live(
@@ -68,11 +72,13 @@ async def fly_live(
     with _interruptions(orders):
         link = _link(options, orders)
         with closing(link):
-            preparation = await _prepared(mission, link, options)
+            mission, rates, preparation = await _prepared(mission, link, options)
             preparation.require()
             if options.confirm is not None and not await link.wait(options.confirm(preparation)):
                 raise RefusedError("not confirmed: nothing was armed")
-            return await _fly_prepared(mission, seed, folder, options, orders, report, link, preparation)
+            return await _fly_prepared(
+                mission, rates, seed, folder, options, orders, report, link, preparation
+            )
 
 
 async def probe(mission: Mission, options: LiveOptions, orders: Orders) -> tuple[Preparation, list[str]]:
@@ -81,7 +87,7 @@ async def probe(mission: Mission, options: LiveOptions, orders: Orders) -> tuple
     Returns also where each vehicle was heard.  Raises RefusedError where too few are heard, StoppedError.
     """
     with _interruptions(orders), closing(_link(options, orders)) as link:
-        preparation = await _prepared(mission, link, options)
+        _, _, preparation = await _prepared(mission, link, options)
         return preparation, [link.wires.way(session.system) for session in link.sessions]
 
 
@@ -106,27 +112,36 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
             raise StoppedError("stopped before anything was armed")
         options.watching(now, sessions)
 
-    return LiveLink(FlightClock(options.speed), options.wires(), look)
+    return LiveLink(FlightClock(options.speed), options.wires(options.signing), look, options.signing)
 
 
-async def _prepared(mission: Mission, link: LiveLink, options: LiveOptions) -> Preparation:
-    await link.connect(options.addresses, session_settings(mission), options.connect_timeout_s)
+async def _prepared(
+    mission: Mission, link: LiveLink, options: LiveOptions
+) -> tuple[Mission, Rates, Preparation]:
+    """Find the vehicles and have them prepared; also the mission and the rates that their wires carry."""
+    systems = await link.find(options.addresses, options.connect_timeout_s)
+    heard_on = [link.wires.address(system) for system in systems]
+    budget = plan(mission, heard_on, options.signing is not None, options.speed)
+    options.telling(str(budget))
+    mission, rates = lowered(mission, budget.rates), budget.rates
+    settings = replace(session_settings(mission), rate_hz=rates.positions, status_rate_hz=rates.status)
+    link.meet(systems, settings)
     preparation = Preparation(mission, link.sessions, link.clock.now(), options.adapt)
     await link.prepare(preparation)
-    return preparation
+    return mission, rates, preparation
 
 
 async def _fly_prepared(
-    mission: Mission, seed: int, folder: RunFolder, options: LiveOptions, orders: Orders, report: Report,
-    link: LiveLink, preparation: Preparation,
+    mission: Mission, rates: Rates, seed: int, folder: RunFolder, options: LiveOptions, orders: Orders,
+    report: Report, link: LiveLink, preparation: Preparation,
 ) -> Outcome:  # fmt: skip
     """Build the world about where the vehicles stand, and fly."""
     sessions = link.sessions
     as_found = stands(mission, sessions) if mission.launch == "as_found" else None
     scenario = Scenario(mission, ideal=False, stands=as_found)
     world = scenario.world(seed)
-    describe_vehicles(world.fleet, sessions, options.own_stubs)
-    world.rules["separation"] += unsure_m(world.fleet, sessions, options.own_stubs)
+    describe_vehicles(world.fleet, sessions, options.own_stubs, stale_s(rates))
+    world.rules["separation"] += unsure_m(world.fleet, sessions, options.own_stubs, stale_s(rates))
     text = f"# Flown with --seed {seed}.\n" + dump(mission)
     folder.write_text(folder.mission, text)
     journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
@@ -155,18 +170,23 @@ def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:
     return np.array([place_en(mission, s) if s.telemetry.positioned else told[0] for s in sessions])
 
 
-def unsure_m(fleet: Records, sessions: Sequence[Session], own: bool) -> float:
+def unsure_m(fleet: Records, sessions: Sequence[Session], own: bool, positions_stale_s: float) -> float:
     """How much more than the separation the guard keeps, because nobody knows better how vehicles stop."""
     adapters = [session.adapter for session in sessions]
     unsure_s = [UNSURE_OF_STUBS_S if own or a is None else a.limits.unsure_s for a in adapters]
-    return float(max(fleet["speed"] * np.array(unsure_s)))
+    return float(max(fleet["speed"] * (np.array(unsure_s) + positions_stale_s)))
 
 
-def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) -> None:
-    """Give planner and guard what a vehicle says that it can do: its speed, how it brakes, how late it acts."""
+def describe_vehicles(
+    fleet: Records, sessions: Sequence[Session], own: bool, positions_stale_s: float
+) -> None:
+    """Give planner and guard what a vehicle says that it can do: its speed, how it brakes, how late it acts.
+
+    ``positions_stale_s``: a thin wire's positions are older by this on average, and what was sent since is not in them.
+    """
     for row, session in zip(fleet, sessions, strict=True):
         if own or session.adapter is None:
-            row["latency"] = STUB_LATENCY_S
+            row["latency"] = STUB_LATENCY_S + positions_stale_s
             continue
         limits, told = session.adapter.limits, session.parameters
         row["speed"] = min(float(row["speed"]), told.get("speed_mps", np.inf))
@@ -180,4 +200,4 @@ def describe_vehicles(fleet: Records, sessions: Sequence[Session], own: bool) ->
         if ceiling is not None:
             row["altitude"] = min(float(row["altitude"]), ceiling - CEILING_KEPT_M)
         trip = session.statistics().round_trip
-        row["latency"] = limits.latency_s + (trip.median_s if trip else 0.0)
+        row["latency"] = limits.latency_s + (trip.median_s if trip else 0.0) + positions_stale_s

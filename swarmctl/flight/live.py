@@ -14,6 +14,7 @@ from typing import Protocol
 from swarmctl.core.arrays import Records
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.signing import Signing
 from swarmctl.record.errors import RecordError
 from swarmctl.vehicle.addresses import Address
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
@@ -28,6 +29,8 @@ from .preparation import Preparation
 from .swarm import Part, Swarm
 from .track import Track
 
+CALLING_LINK = 0
+"""The link id that calls are signed with; each vehicle's own stream has its system id."""
 SETTLE_S = 1.0
 """After the last vehicle was first heard: more of them would make it unclear which are meant."""
 CALL_S = 0.2
@@ -52,6 +55,9 @@ class Wires(Protocol):
 
     def address(self, system: int) -> Address:
         """The address that a vehicle was heard on."""
+
+    def complaint(self) -> str:
+        """What was dropped for its signature so far, for people."""
 
     def way(self, system: int) -> str:
         """The same and where it sends from, for people."""
@@ -82,24 +88,28 @@ class FlightClock:
 class LiveLink:
     """Every vehicle of a live flight: its session, and the wires its frames go by.
 
-    ``look`` is called while waiting, with the sessions so far; what it raises ends the waiting.
+    ``look`` is called while waiting, with the sessions so far; what it raises ends the waiting.  ``signing``: what
+    is sent is signed, and only what is signed is believed.
     """
 
     def __init__(
-        self, clock: FlightClock, wires: Wires, look: Callable[[float, Sequence[Session]], None]
-    ) -> None:
+        self, clock: FlightClock, wires: Wires, look: Callable[[float, Sequence[Session]], None],
+        signing: Signing | None = None,
+    ) -> None:  # fmt: skip
         self.clock = clock
         self.sessions: list[Session] = []
         self.wires = wires
         self._look = look
+        self._signing = signing
         self._by_system: dict[int, Session] = {}
         self._early: list[tuple[float, list[bytes]]] = []
         self._journal: Journal | None = None
 
-    async def connect(
-        self, addresses: Sequence[Sequence[Address]], settings: SessionSettings, timeout_s: float
-    ) -> None:
-        """Open ``addresses``, those of each vehicle, and wait (wall seconds) for all.  Raises RefusedError."""
+    async def find(self, addresses: Sequence[Sequence[Address]], timeout_s: float) -> list[int]:
+        """Open ``addresses``, those of each vehicle, and wait (wall seconds) for all; their system ids.
+
+        Raises RefusedError.
+        """
         places = list(dict.fromkeys(address for own in addresses for address in own))
         try:
             await self.wires.open(places)
@@ -107,16 +117,20 @@ class LiveLink:
             raise RefusedError(str(error)) from None
         await self._wait_for(addresses, timeout_s)
         systems = self._assign(addresses)
-        if None in systems:
+        found = [system for system in systems if system is not None]
+        if len(found) < len(systems):
             heard = ", ".join(map(str, self.wires.heard)) or "none"
             named = ", ".join(map(str, places[:6])) + (" ..." if len(places) > 6 else "")
-            found = len(systems) - systems.count(None)
             raise RefusedError(
-                f"heard {found} of {len(systems)} vehicles (system ids: {heard}) on {named} within {timeout_s:g} s"
+                f"heard {len(found)} of {len(systems)} vehicles (system ids: {heard}) on {named} "
+                f"within {timeout_s:g} s{self.wires.complaint()}"
             )
+        return found
+
+    def meet(self, systems: Sequence[int], settings: SessionSettings) -> None:
+        """Begin a session with each of these vehicles."""
         for system in systems:
-            assert system is not None
-            session = Session(system, settings=settings, now=self.clock.now())
+            session = Session(system, settings=settings, now=self.clock.now(), signing=self._signing)
             self.sessions.append(session)
             self._by_system[system] = session
         self.wires.subscribe(self._take)
@@ -139,7 +153,8 @@ class LiveLink:
         end = loop.time() + timeout_s
         enough_at: float | None = None
         while loop.time() < end:
-            self.wires.call(caller.heartbeat(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4))
+            beat = caller.heartbeat(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4)
+            self.wires.call(self._signing.sign(beat, CALLING_LINK) if self._signing else beat)
             await asyncio.sleep(CALL_S)
             self._look(self.clock.now(), ())
             if None not in self._assign(addresses):

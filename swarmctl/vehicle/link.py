@@ -3,12 +3,16 @@
 Only the vehicle's own frames pass.  A frame that comes twice is recorded but not passed on, or an old
 COMMAND_ACK would answer a new command.  Nor is one that tells the vehicle's state if a newer one of its kind
 overtook it on the way: an old HEARTBEAT would show a mode that is no more.
+
+With a key every frame is signed as it is queued, under the vehicle's system id as its link id: each vehicle has
+a stream of its own, on which times rise, even where many share one radio.
 """
 
 from typing import Any
 
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.signing import SignedDecoder, Signing, Verdict, Verifier
 
 from .commands import AUTOPILOT_COMPONENT
 
@@ -32,14 +36,16 @@ STATE_MESSAGES: frozenset[int] = frozenset(
 
 
 class Link:
-    """The link to the vehicle ``system``. ``encoder`` numbers what we send on it."""
+    """The link to the vehicle ``system``, signed if there is a key. ``encoder`` numbers what we send on it."""
 
-    def __init__(self, system: int) -> None:
+    def __init__(self, system: int, signing: Signing | None = None) -> None:
         self.system = system
         self.encoder = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
         self.received = 0
         self.late = 0
-        self._decoder = Decoder()
+        self._signing = signing
+        self._verifier = Verifier(signing) if signing else None
+        self._decoder = SignedDecoder(self._verifier) if self._verifier else Decoder()
         self._newest: int | None = None
         self._count = 0  # the newest frame's number, counted on beyond the wire's 255
         self._told: dict[int, int] = {}  # message id → the number of the newest frame of its kind
@@ -56,6 +62,10 @@ class Link:
     def bad(self) -> int:
         """Stretches of bytes that were no frame."""
         return self._decoder.bad
+
+    def refused(self, verdict: Verdict) -> int:
+        """How many frames were dropped on this verdict; without a key none is."""
+        return self._verifier.counts[verdict] if self._verifier else 0
 
     def take(self, data: bytes) -> list[Frame]:
         """The autopilot's frames that ``data`` completes, without repeated and outdated ones."""
@@ -99,6 +109,8 @@ class Link:
 
     def send(self, frame: bytes) -> None:
         """Queue a frame."""
+        if self._signing is not None:
+            frame = self._signing.sign(frame, self.system)
         self._outgoing.append(frame)
         self._traffic.append(frame)
 

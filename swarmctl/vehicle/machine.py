@@ -6,6 +6,8 @@ the orders that its signals come from.
 
 import math
 
+from swarmctl.mavlink.signing import REFUSED, Signing, Verdict
+
 from . import procedures
 from .autopilots.adapter import Adapter
 from .autopilots.registry import ADAPTERS, adapter_for, autopilot_name
@@ -28,8 +30,9 @@ class Machine:
     """One vehicle's walk through the table.  Its times are the caller's, its durations on the caller's clock."""
 
     def __init__(
-        self, system: int, *, settings: SessionSettings, now: float, preflight: Preflight | None = None
-    ) -> None:
+        self, system: int, *, settings: SessionSettings, now: float, preflight: Preflight | None = None,
+        signing: Signing | None = None,
+    ) -> None:  # fmt: skip
         self.system = system
         self.phase = Phase.CONNECTING
         self.reason = ""  #: why it FAILED or was RELEASED
@@ -38,7 +41,7 @@ class Machine:
         self.adapter: Adapter | None = None
         self._settings = settings.on_clock()
         self._now = now
-        self._link = Link(system)
+        self._link = Link(system, signing)
         self._checks = Checks(preflight or Preflight(), self._link, self._settings)
         self._watch = Watch(self._settings)
         self._tally = Tally()
@@ -55,6 +58,7 @@ class Machine:
         self._answered_at: float | None = None  # a ping; None: it never has
         self._lost_at = now
         self._set_ups = 0
+        self._refusals_told: set[Verdict] = set()
         self._actions = {action: getattr(self, f"_{action.value}") for action in Action}
         self._schedule()
 
@@ -241,6 +245,14 @@ class Machine:
         """Work out when ``poll`` is next needed."""
         procedure = self._procedure.deadline if self._procedure and not self._suspended else math.inf
         self._wake = min(self._heartbeat_due, self._hold_due, self._link_deadline(), procedure)
+
+    def _tell_refusals(self) -> None:
+        """Say when frames are first dropped for their signature, once for each kind."""
+        for verdict in REFUSED:
+            if verdict not in self._refusals_told and self._link.refused(verdict):
+                self._refusals_told.add(verdict)
+                text = f"vehicle {self.system}: frames in its name are dropped: {verdict.value}"
+                self._report(EventKind.WARNING, text)
 
     def _report(self, kind: EventKind, text: str) -> None:
         self._events.append(Event(self._now, self.system, kind, text))

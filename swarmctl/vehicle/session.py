@@ -81,6 +81,7 @@ class Session(Machine):
         if now + TIME_SLACK_S >= self._heartbeat_due:
             self._heartbeat_due = now + self._settings.heartbeat_period_s
             self._link.send_heartbeat()
+            self._tell_refusals()
             if self.phase is not Phase.CONNECTING:
                 self._link.send_message(self._tally.ping(now))
         if now + TIME_SLACK_S >= self._link_deadline():

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from swarmctl.mavlink.messages import Timesync
+from swarmctl.mavlink.signing import Verdict
 
 from .link import Link
 
@@ -37,6 +38,9 @@ class Statistics:
     messages_lost: int  #: missing by sequence number
     messages_bad: int  #: garbage or failed checksums
     messages_late: int  #: repeated or overtaken on the way
+    messages_unsigned: int  #: dropped for want of a signature, as are the next two; 0 without a key
+    messages_wrongly_signed: int
+    messages_replayed: int
     setpoints_sent: int
     setpoints_refused: int  #: not finite, and so never sent
     setpoint_interval: Spread | None
@@ -100,6 +104,9 @@ class Tally:
             messages_lost=link.lost,
             messages_bad=link.bad,
             messages_late=link.late,
+            messages_unsigned=link.refused(Verdict.UNSIGNED),
+            messages_wrongly_signed=link.refused(Verdict.WRONG),
+            messages_replayed=link.refused(Verdict.REPLAYED),
             setpoints_sent=self.setpoints_sent,
             setpoints_refused=self.setpoints_refused,
             setpoint_interval=spread(self.setpoint_intervals_s),

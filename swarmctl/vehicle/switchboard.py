@@ -3,12 +3,19 @@
 One port may carry many vehicles and several ports one each; what tells them apart is the system id in every
 frame.  A datagram goes to its vehicle as it came; a stream is cut into frames first.  Each vehicle is
 answered at the address that it last sent from.
+
+With a signing key only a signed frame makes a vehicle known, or moves the address that it is answered at.  The
+sessions judge for themselves what they take in, and count what they do not, so they are handed everything.  A
+vehicle whose clock is behind signs with a time that is long past, until it hears a newer one: it is called where
+it sends from, and nothing more, until then.
 """
 
+from collections import Counter
 from collections.abc import Callable
 
 from swarmctl.mavlink.codec import Decoder, Frame
 from swarmctl.mavlink.dialect import mav
+from swarmctl.mavlink.signing import Signing, Verdict, Verifier
 
 from .addresses import Address
 from .transports import Peer, Wire, open_wire
@@ -17,6 +24,7 @@ AUTOPILOT_COMPONENT: int = mav.MAV_COMP_ID_AUTOPILOT1
 HEARTBEAT: int = mav.MAVLINK_MSG_ID_HEARTBEAT
 NOT_VEHICLES = (mav.MAV_TYPE_GCS, mav.MAV_TYPE_ONBOARD_CONTROLLER, mav.MAV_TYPE_GIMBAL, mav.MAV_TYPE_ADSB)
 STREAMS = ("tcp", "serial")
+MOST_BEHIND = 256
 Deliver = Callable[[int, bytes], None]
 
 
@@ -24,9 +32,13 @@ class Switchboard:
     """Open wires, and the way to each vehicle that was heard on them.
 
     ``deliver(system, data)`` is called with bytes of each vehicle that somebody asked for by `subscribe`.
+    ``strangers``: how many frames of which system id were dropped on which verdict, if there is a key.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, signing: Signing | None = None) -> None:
+        self.strangers: Counter[tuple[int, Verdict]] = Counter()
+        self._verifier = Verifier(signing) if signing else None
+        self._behind: dict[tuple[int, Peer], Wire] = {}
         self._wires: list[Wire] = []
         self._decoders: dict[int, Decoder] = {}
         self._ways: dict[int, tuple[Wire, Peer]] = {}
@@ -56,6 +68,16 @@ class Switchboard:
         wire, peer = self._ways[system]
         return f"{wire.address}" + (f" from {peer[0]}:{peer[1]}" if peer else "")
 
+    def complaint(self) -> str:
+        """What was dropped for its signature so far, for people; nothing without a key."""
+        dropped = [
+            f"system {system}: {count} {v.value}"
+            for (system, v), count in sorted(
+                self.strangers.items(), key=lambda item: (item[0][0], item[0][1].value)
+            )
+        ]
+        return f"; frames dropped for their signature: {', '.join(dropped)}" if dropped else ""
+
     def address(self, system: int) -> Address:
         """The address that a vehicle was heard on."""
         return self._ways[system][0].address
@@ -70,6 +92,8 @@ class Switchboard:
         """Send a frame on every wire: what waits to be spoken to (udpout, serial) then answers."""
         for wire in self._wires:
             wire.send(frame, None)
+        for (_, peer), wire in self._behind.items():
+            wire.send(frame, peer)
 
     def close(self) -> None:
         """Close every wire."""
@@ -78,19 +102,34 @@ class Switchboard:
         self._wires.clear()
 
     def _arrived(self, wire: Wire, data: bytes, peer: Peer) -> None:
-        decoder = self._decoders.setdefault(id(wire), Decoder()) if wire.address.kind in STREAMS else None
-        if decoder is not None:
-            for frame in decoder.feed(data):
-                self._hand_on(wire, frame.system, frame.raw, peer)
-                self._note(frame)
+        if wire.address.kind in STREAMS:
+            for frame in self._decoders.setdefault(id(wire), Decoder()).feed(data):
+                self._take(wire, frame, peer)
             return
         system = _sender(data)
         if system is None:
+            return
+        if self._verifier is not None:
+            for frame in Decoder().feed(data):
+                self._take(wire, frame, peer)
             return
         if system not in self._heard:
             for frame in Decoder().feed(data):
                 self._note(frame)
         self._hand_on(wire, system, data, peer)
+
+    def _take(self, wire: Wire, frame: Frame, peer: Peer) -> None:
+        """One frame: who sends it and where from is believed only if it is signed, where there is a key."""
+        verdict = self._verifier.judge(frame.raw) if self._verifier else Verdict.GOOD
+        if verdict is Verdict.GOOD:
+            self._note(frame)
+            self._ways[frame.system] = (wire, peer)
+        else:
+            self.strangers[frame.system, verdict] += 1
+            if verdict is Verdict.REPLAYED and peer is not None and len(self._behind) < MOST_BEHIND:
+                self._behind[id(wire), peer] = wire
+        if self._deliver is not None:
+            self._deliver(frame.system, frame.raw)
 
     def _note(self, frame: Frame) -> None:
         """A vehicle is what sends heartbeats as an autopilot."""

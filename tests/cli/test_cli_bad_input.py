@@ -293,3 +293,15 @@ def test_a_bad_mission_through_the_console_script_has_no_traceback(tmp_path: Pat
     assert run.stderr.startswith("m.yaml:1:1: duraton_s: unknown key")
     assert run.stderr.count("\n") == 1
     assert files_below(tmp_path) == ["m.yaml"]
+
+
+def test_a_bad_signing_key_is_named(swarmctl: Swarmctl, tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    words = ("--connect", "udpin://127.0.0.1:14540", "--signing-key", key)
+    refused(swarmctl("check", *words), str(key), "cannot read the signing key")
+    refused(swarmctl("fly", "--signing-key", key), "cannot read the signing key")
+    key.write_text("secret")
+    refused(swarmctl("fly", *words), str(key), "64 hex digits", "openssl rand -hex 32")
+    key.write_text("ab" * 32)
+    refused(swarmctl("fly", "--signing-key", key), "--signing-key is for vehicles by --connect")
+    refused(swarmctl("check", "--signing-key", key), "--signing-key is for vehicles by --connect")

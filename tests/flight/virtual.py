@@ -96,6 +96,10 @@ class StubWires:
         """Where it is."""
         return self._addresses[system - 1]
 
+    def complaint(self) -> str:
+        """Nobody minds signatures here."""
+        return ""
+
     def way(self, system: int) -> str:
         """The same, for people."""
         return str(self.address(system))
@@ -124,9 +128,13 @@ class StubWires:
             self.fleet.advance(loop.time())
             for vehicle in self.fleet.vehicles:
                 for data in vehicle.outgoing():
-                    if any(True for _ in self._decoders[vehicle.system].feed(data)):
-                        self._heard.add(vehicle.system)
-                    self._deliver(vehicle.system, data)
+                    self.leaves(vehicle.system, data)
+
+    def leaves(self, system: int, data: bytes) -> None:
+        """A vehicle has sent something, which is here at once."""
+        if any(True for _ in self._decoders[system].feed(data)):
+            self._heard.add(system)
+        self._deliver(system, data)
 
 
 @dataclass
@@ -134,6 +142,7 @@ class Live:
     """A live flight to be flown in virtual time: its vehicles, and what is done to it.
 
     ``at``: (time in s, deed with the swarm, or None before there is one).  ``faults`` as on the stub's command line.
+    ``options``: of LiveOptions, and ``heard_on`` (each vehicle's address) and ``make_wires``; ``stubs``: of StubFleet.
     """
 
     path: Path
@@ -144,6 +153,7 @@ class Live:
     at: list[tuple[float, Callable[["Live"], None]]] = field(default_factory=list)
     seed: int | None = 5
     options: dict[str, Any] = field(default_factory=dict)
+    stubs: dict[str, Any] = field(default_factory=dict)
     swarm: Swarm | None = None
     orders: Orders = field(default_factory=Orders)
     now: float = 0.0
@@ -156,10 +166,12 @@ class Live:
             pads_m=self.places_m,
             autopilot=self.autopilots,
             seed=self.seed,
+            **self.stubs,
         )
         for fault in self.faults:
             self.fleet.order(parse_order(fault))
-        self.wires = StubWires(self.fleet, self.options.pop("heard_on", None))
+        make_wires = self.options.pop("make_wires", StubWires)
+        self.wires: StubWires = make_wires(self.fleet, self.options.pop("heard_on", None))
         self.wires.each_step = self._step
         self.folder = RunFolder(self.path / "run")
 
@@ -183,7 +195,11 @@ class Live:
         )
         self.folder.path.mkdir()
         options = LiveOptions(
-            **{"addresses": [[ANYWHERE]] * len(self.autopilots), "wires": lambda: self.wires, **self.options}
+            **{
+                "addresses": [[ANYWHERE]] * len(self.autopilots),
+                "wires": lambda signing: self.wires,
+                **self.options,
+            }
         )
 
         def report(now: float, swarm: Swarm, world: World) -> None:

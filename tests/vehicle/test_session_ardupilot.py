@@ -210,4 +210,6 @@ def test_its_modes_and_braking() -> None:
     assert isinstance(adapter, ArduPilot)
     assert adapter.set_mode(MODES.land).parameters[:3] == (1.0, 9.0, 0.0)
     assert adapter.set_mode(MODES.hold).name == "DO_SET_MODE BRAKE"
-    assert 8.0**2 / (2.0 * adapter.limits.braking_mps2) == 16.0
+    limits = adapter.limits  # a real one came 16.2 m further from 8 m/s, and 24.2 m from 10 m/s
+    for speed, came in ((8.0, 16.2), (10.0, 24.2)):
+        assert came < speed * limits.latency_s + speed**2 / (2.0 * limits.braking_mps2) < came + 4.0

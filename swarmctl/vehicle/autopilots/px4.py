@@ -89,7 +89,7 @@ _FENCE_ACTIONS = {
 _LOSS_ACTIONS = {0: "returns", 1: "returns", 2: "returns", RETURN: "returns", 4: "lands", 5: "holds"}
 _STOPS_MOTORS = (6, 7)
 
-# What the onboard link carries often, or at every change of mode, without being asked.
+# What the onboard link carries often, or at every change of mode, without being asked, and what a thin link feels.
 UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_ATTITUDE,
     mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
@@ -105,6 +105,10 @@ UNWANTED_MESSAGES: tuple[int, ...] = (
     mav.MAVLINK_MSG_ID_HIGHRES_IMU,
     mav.MAVLINK_MSG_ID_ALTITUDE,
     mav.MAVLINK_MSG_ID_ODOMETRY,
+    mav.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mav.MAVLINK_MSG_ID_BATTERY_STATUS,
+    mav.MAVLINK_MSG_ID_VIBRATION,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME,
     CURRENT_MODE,
 )
 
