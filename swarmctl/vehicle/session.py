@@ -140,18 +140,39 @@ class Session(Machine):
         self.reason = "released by order"
         self._signal(Signal.RELEASE)
 
+    def adopt(self) -> None:
+        """Order: take control of a vehicle that was FOUND in the air, at its present height.  Raises OrderError.
+
+        As ``retake``; but only from a mode in which nobody has a hand on the stick.
+        """
+        mode = self.telemetry.mode
+        if self.adapter is not None and mode not in self.adapter.modes.unattended:
+            name = self.adapter.modes.name(mode)
+            raise OrderError(f"vehicle {self.system}: cannot be taken back, a pilot flies it in {name}")
+        self._take(Signal.ADOPT)
+
+    def decline(self, reason: str) -> None:
+        """Order: leave a vehicle that was FOUND in the air to whoever flies it.  Raises OrderError."""
+        self._require(Signal.DECLINE)
+        self.reason = reason
+        self._signal(Signal.DECLINE)
+
     def retake(self) -> None:
         """Order: take control of a RELEASED vehicle, at its present height.  Raises OrderError.
 
         Refused for one that is not flying, or does not say where.
         """
-        self._require(Signal.RETAKE)
+        self._take(Signal.RETAKE)
+
+    def _take(self, signal: Signal) -> None:
+        """Take control of a vehicle that is flying and says where."""
+        self._require(signal)
         if not self.telemetry.armed or self.telemetry.landed_state == procedures.ON_GROUND:
             raise OrderError(f"vehicle {self.system}: cannot be retaken, it is not flying")
         if self._now - self.telemetry.received_at > self._settings.position_loss_s:
             raise OrderError(f"vehicle {self.system}: cannot be retaken, its position is not known")
         self._altitude_m = self.telemetry.height_m
-        self._signal(Signal.RETAKE)
+        self._signal(signal)
 
     def setpoint(self, v_east: float, v_north: float, altitude_m: float) -> bool:
         """Fly this velocity (m/s) at this height above home (m) until the next setpoint.
