@@ -18,7 +18,10 @@ from .jit import kernel
 REACHED_M = 0.6  # so near to its search height a vehicle is there
 DRIFT_M = 1.5  # so far from the height that it keeps, it keeps the one where it is: it was still climbing or sinking
 AWAY_MPS = 3.0
-PLACES_ROUND, MOST_CIRCLES = 16, 16  # places tried on each circle round where it is, and circles, half the room apart
+PLACES_ROUND, MOST_CIRCLES = (
+    16,
+    16,
+)  # places tried on each circle round where it is, and circles, half the room apart
 MARGIN_M = 1.0  # a place must be so much clearer of others than it needs
 
 

@@ -89,7 +89,12 @@ class Transition(NamedTuple):
 
 SETTING_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.CHECKING)
 SET_UP = (*SETTING_UP, Phase.READY, Phase.FOUND)
-LOCATED = (Phase.POSITIONING, Phase.CHECKING, Phase.READY, Phase.FOUND)  # not ours yet, once a position has come
+LOCATED = (
+    Phase.POSITIONING,
+    Phase.CHECKING,
+    Phase.READY,
+    Phase.FOUND,
+)  # not ours yet, once a position has come
 STREAMING = (Phase.ENGAGING, Phase.STOPPING, Phase.RELEASING)
 AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGED, *STREAMING)
 FLYING = (*AIRBORNE, Phase.LANDING)

@@ -79,7 +79,7 @@ def finding(adapter: Adapter, settings: SessionSettings) -> Steps:
 
     One that is about to touch down is let land.
     """
-    return _messages(adapter, settings, _flies_on_or_has_landed)
+    return _messages(adapter, settings, flies_on_or_has_landed)
 
 
 def _messages(adapter: Adapter, settings: SessionSettings, standing: Condition) -> Steps:
@@ -105,7 +105,7 @@ def _messages(adapter: Adapter, settings: SessionSettings, standing: Condition) 
     )
 
 
-def _flies_on_or_has_landed(t: Telemetry) -> bool:
+def flies_on_or_has_landed(t: Telemetry) -> bool:
     """Not on the last metres of a landing, nor on the ground with motors that still run."""
     low = t.landed_state == LANDING and t.height_m < LET_LAND_M
     return t.landed_state != 0 and (not t.armed or not (low or t.landed_state == ON_GROUND))

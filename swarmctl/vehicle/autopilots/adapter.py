@@ -38,9 +38,7 @@ class Modes:
     @property
     def unattended(self) -> frozenset[int]:
         """In which nobody has a hand on the stick: ours, and those that a failsafe chooses."""
-        return frozenset(
-            (self.take_off, self.hold, self.engaged, self.land, self.comeback, *self.failsafes)
-        )
+        return frozenset((self.take_off, self.hold, self.engaged, self.land, self.comeback, *self.failsafes))
 
     def name(self, mode: int) -> str:
         """The mode's name, or its number."""
