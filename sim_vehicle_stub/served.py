@@ -23,8 +23,8 @@ from .fleet import StubFleet
 from .links import serve, udp
 
 STEP_S = 0.02
-LANDED_S, ALOFT_S = 15.0, 1800.0
-"""Wall time without a ground station after which an orphaned process ends, its vehicles down or not."""
+LANDED_S, ALOFT_S = 30.0, 1800.0
+"""Wall time without a ground station, after landing and in the air, after which an orphaned process ends."""
 LOOK_S = 0.5
 OWN_PORT_OFFSET = 1000
 
@@ -69,14 +69,12 @@ async def _run(wanted: dict[str, Any]) -> None:
 async def _forsaken(fleet: StubFleet, speed: float) -> None:
     """Wait until the controller is gone, and nobody has come in its place."""
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
-    while not _is_forsaken(fleet, speed):
+    landed_s = silent_s = 0.0
+    while landed_s < LANDED_S and silent_s < ALOFT_S:
         await asyncio.sleep(LOOK_S)
-
-
-def _is_forsaken(fleet: StubFleet, speed: float) -> bool:
-    """Whether nobody has spoken to any vehicle for a while."""
-    silent_s = min(vehicle.now - (vehicle.gcs_at or 0.0) for vehicle in fleet.vehicles) / speed
-    return silent_s >= (ALOFT_S if any(vehicle.armed for vehicle in fleet.vehicles) else LANDED_S)
+        silent_s = min(vehicle.now - (vehicle.gcs_at or 0.0) for vehicle in fleet.vehicles) / speed
+        down = not any(vehicle.armed for vehicle in fleet.vehicles)
+        landed_s = min(landed_s + LOOK_S, silent_s) if down else 0.0
 
 
 def main() -> None:

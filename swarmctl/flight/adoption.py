@@ -24,7 +24,9 @@ FIND_S = 90.0
 """A session gives up by itself when a step takes too long; this bounds all steps together."""
 HEAR_S = 20.0
 """One that is silent for so long is not waited for while the others fly on without a controller."""
-SETTLED = (Phase.FOUND, Phase.LANDED, Phase.RELEASED, Phase.FAILED)
+ANSWER_S = 10.0
+"""One that has not answered a ping by then does not hear."""
+SETTLED = (Phase.LANDED, Phase.RELEASED, Phase.FAILED)
 
 
 def preflight(mission: Mission) -> Preflight:
@@ -78,6 +80,8 @@ class Adoption:
     @staticmethod
     def _settled(session: Session, waited_s: float) -> bool:
         """Whether a vehicle is found, gone, or lands by itself just now."""
+        if session.phase is Phase.FOUND:
+            return session.round_trip_s is not None or waited_s > ANSWER_S
         if session.phase in SETTLED or waited_s > FIND_S:
             return True
         if session.phase in (Phase.CONNECTING, Phase.LOST):

@@ -7,6 +7,7 @@ were being steered is left behind: they are found anew, wherever they are by the
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from swarmctl.core.world import World
 from swarmctl.mission.load import load
 from swarmctl.mission.model import Mission
 from swarmctl.record import mcap_read, rows
-from swarmctl.record.errors import RunFolderError
+from swarmctl.record.errors import LogError, RunFolderError
 from swarmctl.record.folder import RunFolder
 from swarmctl.record.mcap_read import Log
 from swarmctl.record.replay import Restored, restore
@@ -73,7 +74,7 @@ class Resumption:
 
     def note(self, folder: RunFolder) -> None:
         """From now on the flight goes on in ``folder``: nobody shall resume this one."""
-        folder.write_text(self.run / CONTINUED, f"{folder.path}\n")
+        folder.write_text(self.run / CONTINUED, f"{folder.path.absolute()}\n")
 
     def metadata(self) -> dict[str, str]:
         """What the recording of the flight that goes on says of this one."""
@@ -87,6 +88,8 @@ class Resumption:
 
 def read(path: Path) -> Resumption:
     """Read the flight in ``path``.  Raises RecordError, MissionError, saying why it cannot be flown on."""
+    if path.is_dir() and not RunFolder(path).mcap.exists():
+        raise RunFolderError(f"{path}: nothing was recorded: nobody had taken off (fly the mission anew)")
     folder = RunFolder.open(path)
     if is_under_way(path):
         raise RunFolderError(f"{path}: this flight is under way (swarmctl control speaks to it)")
@@ -121,10 +124,11 @@ def read(path: Path) -> Resumption:
 
 
 def _refuse_continued(path: Path) -> None:
-    """Whoever continued it may have died as well: then that flight is the one to go on with."""
-    note = path / CONTINUED
-    if note.exists():
-        raise RunFolderError(f"{path}: was flown on in {note.read_text().strip()}: resume that")
+    """Whoever continued it may have died as well: then that flight is the one to go on with, if it holds anything."""
+    with suppress(FileNotFoundError, LogError):
+        other = Path((path / CONTINUED).read_text().strip())
+        if next(mcap_read.read(other / "flight.mcap").rows("/ticks"), None) is not None:
+            raise RunFolderError(f"{path}: was flown on in {other}: resume that")
 
 
 def _last_events(log: Log, systems: list[int]) -> tuple[dict[int, str], str]:

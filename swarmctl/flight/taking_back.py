@@ -53,6 +53,8 @@ class TakingBack:
             if session.phase in (Phase.CONNECTING, Phase.LOST):
                 self._roster.miss(i)
                 self._note(i, now, "lost", "is not heard")
+            elif session.phase is Phase.LANDED:
+                self._note(i, now, "landed", "had landed before it was found")
 
     def tick(self, now: float) -> None:
         """Take back whoever is found, where it is."""

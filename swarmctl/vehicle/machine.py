@@ -118,17 +118,18 @@ class Machine:
             self._procedure = None
             if procedure.failure:
                 self.reason = procedure.failure
-            self._signal(self._set_up_in_flight(procedure) or _ended(procedure))
+            self._signal(self._failed() if procedure.failure else self._done())
         self._schedule()
 
-    def _set_up_in_flight(self, procedure: Procedure) -> Signal | None:
-        """How the set-up of a vehicle that another controller took off has ended, if it has."""
-        if not self._adopts or self.phase not in SETTING_UP:
-            return None
-        if procedure.failure and self.telemetry.armed:
-            return Signal.FAILED_IN_FLIGHT
-        if procedure.failure or self.phase is not Phase.CHECKING:
-            return None
+    def _failed(self) -> Signal:
+        """A phase has failed; to set up a vehicle that another controller took off may do so in the air."""
+        in_flight = self._adopts and self.phase in SETTING_UP and self.telemetry.armed
+        return Signal.FAILED_IN_FLIGHT if in_flight else Signal.STEP_FAILED
+
+    def _done(self) -> Signal:
+        """A phase's steps are done; of a vehicle that another controller took off, in the air or after landing."""
+        if not self._adopts or self.phase is not Phase.CHECKING:
+            return Signal.STEPS_DONE
         return Signal.CHECKED_IN_FLIGHT if self.telemetry.armed else Signal.CHECKED_LANDED
 
     @property
@@ -147,10 +148,10 @@ class Machine:
         if self.adapter is None:
             known = ", ".join(autopilot_name(number) for number in ADAPTERS)
             self.reason = f"its autopilot is {autopilot_name(self._autopilot)}; can fly: {known}"
-            self._signal(Signal.STEP_FAILED)
+            self._signal(self._failed())
         elif self._set_ups > self._settings.set_up_attempts:
             self.reason = f"its set-up was broken off {self._set_ups - 1} times"
-            self._signal(Signal.STEP_FAILED)
+            self._signal(self._failed())
         else:
             self._begin(procedures.identifying(self._settings))
 
@@ -266,8 +267,3 @@ class Machine:
 
     def _report(self, kind: EventKind, text: str) -> None:
         self._events.append(Event(self._now, self.system, kind, text))
-
-
-def _ended(procedure: Procedure) -> Signal:
-    """How a procedure ended."""
-    return Signal.STEP_FAILED if procedure.failure else Signal.STEPS_DONE

@@ -12,6 +12,7 @@ What happens in the air, and what the session does about it:
   firmware's own failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that
   is not heard may hear.  When the link is back, a vehicle that was being set up is set up again from the start,
   for it may have restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
+- Another controller took it off and died: it is FOUND in the air, and ``adopt``ed by order.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
 - It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
 - It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
@@ -145,10 +146,10 @@ class Session(Machine):
 
         As ``retake``; but only from a mode in which nobody has a hand on the stick.
         """
-        mode = self.telemetry.mode
-        if self.adapter is not None and mode not in self.adapter.modes.unattended:
-            name = self.adapter.modes.name(mode)
-            raise OrderError(f"vehicle {self.system}: cannot be taken back, a pilot flies it in {name}")
+        self._require(Signal.ADOPT)
+        modes, mode = self._known_adapter().modes, self.telemetry.mode
+        if mode not in modes.unattended:
+            raise OrderError(f"vehicle {self.system}: a pilot flies it in {modes.name(mode)}")
         self._take(Signal.ADOPT)
 
     def decline(self, reason: str) -> None:
