@@ -196,6 +196,46 @@ def test_a_pilot_who_took_over_meanwhile_is_left_alone(tmp_path: Path) -> None:
     assert outcomes(outcome)[:2] == ["landed", "landed"]
 
 
+def test_one_outside_the_fence_is_left_alone(tmp_path: Path) -> None:
+    live = Live(tmp_path, LONG, autopilots=["ardupilot"] * 3)
+    left = killed(live, 90.0, 5.0)
+    live.fleet.truth["east"][1] = -12.0
+    outcome = live.resume(left)
+    assert "vehicle 2: it is outside the fence" in events(outcome, 2)
+    assert outcomes(outcome) == ["landed", "released", "landed"]
+
+
+def test_one_whose_battery_is_low_is_brought_home_by_us(tmp_path: Path) -> None:
+    live = Live(tmp_path, LONG, autopilots=["ardupilot"] * 3)
+    left = killed(live, 90.0, 5.0)
+    live.fleet.vehicles[1].battery.collapse()
+    live.fleet.vehicles[1].battery._endurance_s = 2000.0
+    live.fleet.vehicles[1].battery._airborne_s = 1600.0
+    outcome = live.resume(left)
+    assert "battery at 19 %: returns" in events(outcome, 2)
+    assert (outcomes(outcome), outcome.exit_code()) == (["landed"] * 3, 0)
+
+
+def test_one_that_is_not_heard_is_missed_and_taken_back_when_it_is(tmp_path: Path) -> None:
+    live = Live(tmp_path, LONG, autopilots=["ardupilot"] * 3)
+    left = killed(live, 90.0, 5.0)
+    live.fleet.vehicles[2].network.impair(up_cut=True, down_cut=True)
+    live.at = [(60.0, lambda live: live.fleet.vehicles[2].network.impair(up_cut=False, down_cut=False))]
+    outcome = live.resume(left)
+    told = events(outcome, 3)
+    assert "is not heard" in told and "taken back: found in the air, GUIDED" in told
+    assert (outcomes(outcome), outcome.exit_code()) == (["landed"] * 3, 0)
+
+
+def test_the_order_to_return_still_holds(tmp_path: Path) -> None:
+    live = Live(tmp_path, LONG)
+    live.at = [(60.0, order("return"))]
+    outcome = live.resume(killed(live, 62.0, 0.5))
+    assert (outcomes(outcome), outcome.exit_code()) == (["landed"] * 3, 0)
+    searched_s = outcome.summary("")["searched_s"]
+    assert searched_s < 60.0 and searched_s == resumption.read(tmp_path / "killed").restored.ticks
+
+
 def test_nobody_in_the_air_is_refused(tmp_path: Path) -> None:
     live = Live(tmp_path, LONG)
     left = killed(live, 60.0, 200.0)
