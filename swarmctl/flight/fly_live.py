@@ -110,7 +110,8 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
 
     def look(now: float, sessions: Sequence[Session]) -> None:
         if orders.level:
-            raise StoppedError(f"stopped before {_to_be_done(options)}")
+            what = "anybody was taken back" if options.resumes else "anything was armed"
+            raise StoppedError(f"stopped before {what}")
         options.watching(now, sessions)
 
     return LiveLink(FlightClock(options.speed), options.wires(), look)
@@ -140,11 +141,8 @@ async def _found(before: Resumption, link: LiveLink, options: LiveOptions) -> Re
 async def _confirm(start: Preparation | Adoption, link: LiveLink, options: LiveOptions) -> None:
     """Have the operator say yes.  Raises RefusedError."""
     if options.confirm is not None and not await link.wait(options.confirm(start)):
-        raise RefusedError(f"not confirmed: stopped before {_to_be_done(options)}")
-
-
-def _to_be_done(options: LiveOptions) -> str:
-    return "anybody was taken back" if options.resumes else "anything was armed"
+        what = "nobody was taken back" if options.resumes else "nothing was armed"
+        raise RefusedError(f"not confirmed: {what}")
 
 
 async def _fly_prepared(

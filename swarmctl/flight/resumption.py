@@ -104,22 +104,20 @@ def read(path: Path) -> Resumption:
         )
     if next(log.rows("/ticks"), None) is None:
         raise RunFolderError(f"{path}: nobody had taken off (fly the mission anew)")
-    restored = restore(log)
+    mission, restored = load(folder.mission), restore(log)
     fleet, targets = restored.world.fleet, restored.world.scene.targets
-    systems = [int(system) for system in about["systems"].split()]
+    so_far = searched(log, len(fleet), len(targets), restored.ticks)
+    try:
+        systems = [int(system) for system in about["systems"].split()]
+        addresses = [parse(url)[0] for url in about["connect"].split()]
+        seed, speed, own_stubs = int(about["seed"]), float(about["speed"]), about["own_stubs"] == "yes"
+    except (KeyError, ValueError):
+        raise RunFolderError(f"{path}: does not say how its vehicles were reached") from None
+    if not len(systems) == len(addresses) == len(fleet) == len(mission.fleet):
+        raise RunFolderError(f"{path}: its mission.yaml and its recording differ in the number of vehicles")
     left, order = _last_events(log, systems)
     return Resumption(
-        run=path,
-        mission=load(folder.mission),
-        seed=int(about["seed"]),
-        systems=systems,
-        addresses=[parse(url)[0] for url in about["connect"].split()],
-        speed=float(about["speed"]),
-        own_stubs=about["own_stubs"] == "yes",
-        restored=restored,
-        searched=searched(log, len(fleet), len(targets), restored.ticks),
-        left=left,
-        order=order,
+        path, mission, seed, systems, addresses, speed, own_stubs, restored, so_far, left, order
     )
 
 

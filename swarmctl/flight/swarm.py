@@ -187,7 +187,7 @@ class Swarm:
         self._read_telemetry(now)
         self._go_on(k, now)
         waits = self.held or self.part in (Part.TAKING_OFF, Part.TAKING_BACK)
-        self._following.follow(waits, self.part is Part.RETURNING)
+        self._following.follow(waits, self.part in (Part.RETURNING, Part.WATCHING))
         self._supervise(now)
         self._began_at += self.held
         ahead = k - self._began_at

@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim_vehicle_stub.configured import configured_fleet
 from swarmctl.flight import resumption
 from swarmctl.flight.errors import RefusedError
 from swarmctl.flight.results import Outcome
 from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
 from swarmctl.record import mcap_read, rows
-from swarmctl.record.errors import RecordError
+from swarmctl.record.errors import LogError, RecordError
 from swarmctl.record.redraw import redraw
 from swarmctl.record.replay import replay
 from swarmctl.record.searched import searched
+from swarmctl.record.stub_replay import replay_stub
 
 from .test_live_orders import order
 from .virtual import Live, events, outcomes
@@ -70,6 +72,8 @@ def test_killed_at_any_moment_it_is_flown_on_and_nothing_is_lost(
     again = replay(mcap_read.read(live.folder.mcap))
     assert again.same and again.decisions == 3 * (70 - before.restored.ticks) and not again.truncated
     assert replay(mcap_read.read(left / "flight.mcap")).same
+    with pytest.raises(LogError, match="began in the air"):
+        replay_stub(live.folder, configured_fleet)
 
 
 def _as_table(pairs: set[tuple[int, int]]) -> np.ndarray:

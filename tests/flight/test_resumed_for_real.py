@@ -4,6 +4,7 @@ import json
 import os
 import signal
 import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -32,6 +33,18 @@ duration_s: {SEARCH_S}
 """
 SPEED = "4"
 """No faster: PX4 is home a minute after its controller died, and the next one needs seconds of the wall's."""
+STAND_BY = """
+import sys
+from pathlib import Path
+from swarmctl import live_cli, resume_cli
+from swarmctl.cli import main
+from swarmctl.flight import fly, resumption
+from swarmctl.mission.load import load
+fly.warm_up(load(Path({mission!r})), "fco")
+print("standing by", file=sys.stderr, flush=True)
+sys.stdin.readline()
+main()
+"""
 PAUSE_S, DEADLINE_S = 0.2, 90.0
 Orphans = Callable[[subprocess.Popen[str]], None]
 
@@ -51,6 +64,31 @@ def kill() -> Iterator[Orphans]:
     for process in orphans:
         with suppress(ProcessLookupError):
             os.kill(process, signal.SIGTERM)
+
+
+@pytest.fixture
+def stand_by(mission: Path) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts a controller that has loaded everything and begins at the next line on its standard input."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(*words: Any) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", STAND_BY.format(mission=str(mission)), *map(str, words)]
+        pipe = subprocess.PIPE
+        running.append(subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True))
+        read_until(running[-1], "standing by")
+        return running[-1]
+
+    yield run
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def go(process: subprocess.Popen[str]) -> None:
+    """Let one that stands by begin."""
+    assert process.stdin is not None
+    process.stdin.write("go\n")
+    process.stdin.flush()
 
 
 @pytest.fixture
@@ -96,9 +134,10 @@ def check(run: Path, summary: dict[str, Any], start: Start) -> None:
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_our_own_stubs_outlive_their_controller_and_are_found_again(
-    autopilot: str, start: Start, kill: Orphans, mission: Path, tmp_path: Path
+    autopilot: str, start: Start, stand_by: Start, kill: Orphans, mission: Path, tmp_path: Path
 ) -> None:
     run = tmp_path / "run"
+    resumed = stand_by("fly", "--resume", run, "--out", tmp_path / "on", "--json")
     flight = start(
         "swarmctl", "fly", "--mission", mission, "--speed", SPEED, "--autopilot", autopilot, "--out", run
     )
@@ -107,7 +146,7 @@ def test_our_own_stubs_outlive_their_controller_and_are_found_again(
     with pytest.raises(RunFolderError, match="this flight is under way"):
         resumption.read(run)
     kill(flight)
-    resumed = start("swarmctl", "fly", "--resume", run, "--out", tmp_path / "on", "--json")
+    go(resumed)
     code, summary = flown(resumed)
     assert code == 0
     assert summary["speed"] == 4.0
@@ -116,11 +155,12 @@ def test_our_own_stubs_outlive_their_controller_and_are_found_again(
 
 
 def test_vehicles_by_url_on_one_port_are_taken_back_after_a_typed_yes(
-    start: Start, stubs: Start, kill: Orphans, mission: Path, tmp_path: Path
+    start: Start, stubs: Start, stand_by: Start, kill: Orphans, mission: Path, tmp_path: Path
 ) -> None:
     port = free_ports(VEHICLES)
     stubs("--port", port, "--shared", "--autopilot", "px4,ardupilot", "--speed", SPEED)
     run = tmp_path / "run"
+    resumed = stand_by("fly", "--resume", run, "--out", tmp_path / "on", "--json")
     flight = start(
         "swarmctl", "fly", "--mission", mission, "--speed", SPEED, "--yes", "--connect", f"udpin://127.0.0.1:{port}",
         "--out", run,
@@ -128,7 +168,7 @@ def test_vehicles_by_url_on_one_port_are_taken_back_after_a_typed_yes(
     read_until(flight, "searching")
     wait_for_search(run, 15)
     kill(flight)
-    resumed = start("swarmctl", "fly", "--resume", run, "--out", tmp_path / "on", "--json")
+    go(resumed)
     said = read_until(resumed, "Type yes")
     assert "found in the air: vehicles 1, 2. Type yes to take them back" in said
     out, err = resumed.communicate("yes\n", timeout=PATIENCE_S)
