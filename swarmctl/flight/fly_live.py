@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
+from swarmctl.core.world import World
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
@@ -151,21 +152,8 @@ async def _fly_prepared(
 ) -> Outcome:  # fmt: skip
     """Build the world about where the vehicles stand, or stood when they took off, and fly."""
     sessions = link.sessions
-    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
-    scenario = Scenario(mission, ideal=False, stands=options.resumes.pads if options.resumes else as_found)
-    world = scenario.world(seed)
-    if options.resumes is not None:
-        options.resumes.give_back(world)
-    describe_vehicles(world.fleet, sessions, options.own_stubs)
-    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
-    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
-    text = f"# Flown with --seed {seed}.\n" + dump(mission)
-    folder.write_text(folder.mission, text)
-    about = {**about_flight(mission, world, seed), **_about_links(link, options)}
-    journal = Journal(folder, world, text, about, flush_s=LIVE_FLUSH_S)
-    if options.resumes is not None:
-        journal.continues(options.resumes.metadata(), options.resumes.searched.seen_rows())
-        options.resumes.note(folder)
+    scenario, world = _built(mission, seed, sessions, options)
+    journal = _recorder(mission, seed, folder, link, world, options)
     swarm = Swarm(mission, world, sessions, journal, start)
     track = Track(len(sessions))
     control = ControlServer(folder.path, lambda words: obey(words, swarm, link.clock.now()))
@@ -182,6 +170,36 @@ async def _fly_prepared(
         mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0, options.speed,
         resumed,
     )  # fmt: skip
+
+
+def _built(
+    mission: Mission, seed: int, sessions: Sequence[Session], options: LiveOptions
+) -> tuple[Scenario, World]:
+    """The world that is flown in, with what another flight had come to if this one resumes it."""
+    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
+    scenario = Scenario(mission, ideal=False, stands=options.resumes.pads if options.resumes else as_found)
+    world = scenario.world(seed)
+    if options.resumes is not None:
+        options.resumes.give_back(world)
+    describe_vehicles(world.fleet, sessions, options.own_stubs)
+    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
+    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
+    return scenario, world
+
+
+def _recorder(
+    mission: Mission, seed: int, folder: RunFolder, link: LiveLink, world: World, options: LiveOptions
+) -> Journal:
+    """The flight's recorder; a flight that is resumed learns where it goes on."""
+    text = f"# Flown with --seed {seed}.\n" + dump(mission)
+    folder.write_text(folder.mission, text)
+    if options.resumes is not None:
+        options.resumes.note(folder)
+    about = {**about_flight(mission, world, seed), **_about_links(link, options)}
+    journal = Journal(folder, world, text, about, flush_s=LIVE_FLUSH_S)
+    if options.resumes is not None:
+        journal.continues(options.resumes.metadata(), options.resumes.searched.seen_rows())
+    return journal
 
 
 def _about_links(link: LiveLink, options: LiveOptions) -> dict[str, str]:

@@ -80,9 +80,8 @@ class Swarm:
         self.held = False
         self.broken_off = False  #: because of what went wrong with a vehicle
         before = start.before if isinstance(start, Resumed) else None
-        self.ticks_before = (
-            before.restored.ticks if before else 0
-        )  #: planner ticks of the flight that is resumed
+        #: planner ticks of the flight that is resumed
+        self.ticks_before = before.restored.ticks if before else 0
         self.decisions = self.ticks_before * len(sessions)
         self.roster = Roster(world, sessions)
         self.in_range_total = before.searched.in_range if before else 0
@@ -99,11 +98,9 @@ class Swarm:
         self._began_at = 0
         self._following = Following(world, sessions, self.roster)
         self._supervision = Supervision(mission, world, sessions, self.roster, self._note)
-        self._taking_back = (
-            TakingBack(start.adoption, world, sessions, self.roster, self._note)
-            if isinstance(start, Resumed)
-            else None
-        )
+        self._taking_back: TakingBack | None = None
+        if isinstance(start, Resumed):
+            self._taking_back = TakingBack(start.adoption, world, sessions, self.roster, self._note)
 
     @property
     def planner_tick(self) -> int:
@@ -226,7 +223,7 @@ class Swarm:
     def _mind_the_others(self, why: str, now: float) -> None:
         safety = self._mission.safety
         if safety.if_one_fails == "abort" or len(self.roster.active) < safety.minimum_vehicles:
-            self.broken_off |= self.part in (Part.TAKING_OFF, Part.SEARCHING)
+            self.broken_off |= self.part in (Part.TAKING_OFF, Part.TAKING_BACK, Part.SEARCHING)
             self.return_all(why, now)
 
     def _welcome(self, i: int) -> None:

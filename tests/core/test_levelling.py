@@ -116,3 +116,20 @@ def test_all_part_and_come_to_their_height_wherever_they_were(seed: int) -> None
     count = int(rng.integers(2, 7))
     places = [(float(e), float(n)) for e, n in rng.uniform(150.0, 190.0, (count, 2))]
     Taken(places, rng.uniform(10.0, 45.0, count).tolist()).settle()
+
+
+@given(st.integers(0, 1 << 32))
+@settings(max_examples=20, deadline=None)
+def test_taken_back_at_full_speed_all_stop_inside_the_fence_and_come_to_their_height(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 7))
+    places = [(float(e), float(n)) for e, n in rng.uniform(40.0, 110.0, (count, 2))]
+    angles = rng.uniform(0.0, 2.0 * math.pi, count)
+    speeds = [(8.0 * math.cos(a), 8.0 * math.sin(a)) for a in angles]
+    flight = Taken(places, rng.uniform(10.0, 45.0, count).tolist(), speeds)
+    for _ in range(MOST_TICKS):
+        flight.tick_once()
+        assert flight.places.min() > 0.0
+        if flight.level:
+            break
+    assert flight.level and flight.nearest() >= 15.0
