@@ -15,7 +15,7 @@ from .worlds import Box, Place
 
 AREA: Box = (0.0, 400.0, 0.0, 400.0)
 ALTITUDE_M = 20.0
-MOST_TICKS = 1200
+SEARCH_TICK, MOST_TICKS = 400, 1200
 
 
 class Taken(Flight):
@@ -31,8 +31,11 @@ class Taken(Flight):
             self.world.poses["v_east"], self.world.poses["v_north"] = np.transpose(speeds)
 
     def tick_once(self) -> None:
-        """One setpoint interval, heights included."""
-        self.step([(0.0, 0.0)] * len(self.places))
+        """One setpoint interval, heights included.  After a while those that are level search, as in a flight."""
+        stage = self.world.errands["stage"]
+        if self.tick >= SEARCH_TICK:
+            stage[stage == stages.HOLD] = stages.SEARCH
+        self.step([(0.0, 8.0) if east > 0.0 else (0.0, -8.0) for east in self.places[:, 0] - 170.0])
         for pose, vehicle, setpoint in zip(
             self.world.poses, self.world.fleet, self.world.setpoints, strict=True
         ):
@@ -54,7 +57,7 @@ class Taken(Flight):
     @property
     def level(self) -> bool:
         """Whether all are at their search height."""
-        return bool((self.world.errands["stage"] == stages.HOLD).all())
+        return bool(np.isin(self.world.errands["stage"], (stages.HOLD, stages.SEARCH)).all())
 
     def settle(self) -> "Taken":
         """Fly until all hold, and watch that nobody comes near another who was not near to begin with."""
