@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +16,13 @@ import click
 
 from .dashboard import Progress, findings_table
 from .flight import clock
+from .flight.adoption import Adoption
 from .flight.fly import autopilots, endurance_s
 from .flight.fly_live import LiveOptions, fly_live, probe
 from .flight.orders import Orders
 from .flight.preparation import Preparation
 from .flight.results import Outcome
+from .flight.resumption import Resumption
 from .mavlink.signing import Signing
 from .mission.model import Mission
 from .mission.scenario import Scenario
@@ -69,17 +71,28 @@ def fly_connected(
     speed: float, sure: bool, adapt: bool,
 ) -> Outcome:  # fmt: skip
     """Fly vehicles that are there already.  Raises AddressError for a bad URL, SigningKeyError for a bad key."""
-
-    def confirm(preparation: Preparation) -> "asyncio.Future[bool]":
-        for line in (*preparation.refusals.values(), *preparation.changes, *preparation.troubles):
-            progress.say(line)
-        return agreed() if sure else confirm_typed(preparation, progress)
-
     options = LiveOptions(
-        addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
-        watching=progress.preparing, adapt=adapt, signing=reach.signing(progress), telling=progress.say,
+        addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s,
+        confirm=confirming(progress, sure), watching=progress.preparing, adapt=adapt,
+        signing=reach.signing(progress), telling=progress.say,
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
+
+
+def fly_on(
+    before: Resumption, folder: RunFolder, reach: Reach, orders: Orders, progress: Progress, *,
+    speed: float | None, sure: bool,
+) -> Outcome:  # fmt: skip
+    """Fly on where another controller died: find its vehicles, take them back.  Raises AddressError for a bad URL."""
+    mission = before.mission
+    at_urls = addresses(mission, reach.urls) if reach.urls else [[address] for address in before.addresses]
+    asks = not (sure or before.own_stubs)
+    options = LiveOptions(
+        at_urls, speed=speed or before.speed, connect_timeout_s=reach.timeout_s, own_stubs=before.own_stubs,
+        confirm=confirming(progress, not asks), watching=progress.preparing, resumes=before,
+        signing=reach.signing(progress), telling=progress.say,
+    )  # fmt: skip
+    return asyncio.run(fly_live(mission, before.seed, folder, options, orders, progress.flying))
 
 
 def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Progress) -> bool:
@@ -124,6 +137,17 @@ def connects(mission: Mission, reach: Reach) -> bool:
     return real
 
 
+def confirming(progress: Progress, sure: bool) -> "Callable[[Preparation | Adoption], asyncio.Future[bool]]":
+    """Tells what was found, then asks at the terminal, unless the operator is sure beforehand."""
+
+    def confirm(start: Preparation | Adoption) -> "asyncio.Future[bool]":
+        for line in start.told():
+            progress.say(line)
+        return agreed() if sure else confirm_typed(start, progress)
+
+    return confirm
+
+
 def agreed() -> "asyncio.Future[bool]":
     """A yes that was given beforehand."""
     answer: asyncio.Future[bool] = asyncio.get_running_loop().create_future()
@@ -131,14 +155,31 @@ def agreed() -> "asyncio.Future[bool]":
     return answer
 
 
-def confirm_typed(preparation: Preparation, progress: Progress) -> "asyncio.Future[bool]":
+def confirm_typed(start: Preparation | Adoption, progress: Progress) -> "asyncio.Future[bool]":
     """Ask for a typed yes at the terminal."""
+    if isinstance(start, Adoption):
+        _ask_to_take_back(start, progress)
+    else:
+        _ask_to_take_off(start, progress)
+    return _typed_yes()
+
+
+def _ask_to_take_back(adoption: Adoption, progress: Progress) -> None:
+    names = ", ".join(str(session.system) for session in adoption.found)
+    progress.say(f"found in the air: vehicles {names}. Type yes to take them back:")
+
+
+def _ask_to_take_off(preparation: Preparation, progress: Progress) -> None:
     names = ", ".join(
         f"{system} ({findings[0].value})"
         for row, (system, findings) in enumerate(zip(preparation.systems, preparation.findings, strict=True))
         if row not in preparation.refusals
     )
     progress.say(f"ready to arm: vehicles {names}. Type yes to take off:")
+
+
+def _typed_yes() -> "asyncio.Future[bool]":
+    """Whether the next line typed is yes."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[bool] = loop.create_future()
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
+from swarmctl.core.world import World
 from swarmctl.mavlink.signing import Signing
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
@@ -19,17 +20,20 @@ from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.switchboard import Switchboard
 
 from . import clock
+from .adoption import Adoption, preflight
 from .budget import Rates, lowered, plan, stale_s
 from .control import ControlServer
 from .errors import RefusedError, StoppedError
 from .fly import Report, about_flight, obey_and_report, session_settings
 from .inspection import CEILING_KEPT_M, place_en
 from .journal import Journal
-from .live import FlightClock, LiveLink, LiveLoop, Wires
+from .live import FlightClock, Known, LiveLink, LiveLoop, Wires
 from .orders import Orders, obey
 from .preparation import Preparation
 from .results import Outcome
+from .resumption import Resumption
 from .swarm import Swarm
+from .taking_back import Resumed
 from .track import Track
 
 LIVE_FLUSH_S = 1.0
@@ -55,7 +59,9 @@ class LiveOptions:
     connect_timeout_s: float = 20.0
     own_stubs: bool = False  #: our own stub vehicles: they fly as the mission says
     adapt: bool = False  #: lower what the mission asks to what the vehicles can do, and set their parameters
-    confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
+    confirm: Callable[[Preparation | Adoption], "asyncio.Future[bool]"] | None = None
+    """Asked before anything is armed, or taken back."""
+    resumes: Resumption | None = None  #: the flight that is flown on
     watching: Watching = lambda now, sessions: None
     telling: Callable[[str], None] = lambda text: None  #: told the budget of each wire
     signing: Signing | None = None  #: signs what is sent; what is not signed is not believed
@@ -72,13 +78,11 @@ async def fly_live(
     with _interruptions(orders):
         link = _link(options, orders)
         with closing(link):
-            mission, rates, preparation = await _prepared(mission, link, options)
-            preparation.require()
-            if options.confirm is not None and not await link.wait(options.confirm(preparation)):
-                raise RefusedError("not confirmed: nothing was armed")
-            return await _fly_prepared(
-                mission, rates, seed, folder, options, orders, report, link, preparation
-            )
+            if options.resumes is not None:
+                mission, rates, start = await _found(options.resumes, link, options)
+            else:
+                mission, rates, start = await _ready(mission, link, options)
+            return await _fly_prepared(mission, rates, seed, folder, options, orders, report, link, start)
 
 
 async def probe(mission: Mission, options: LiveOptions, orders: Orders) -> tuple[Preparation, list[str]]:
@@ -109,7 +113,8 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
 
     def look(now: float, sessions: Sequence[Session]) -> None:
         if orders.level:
-            raise StoppedError("stopped before anything was armed")
+            what = "anybody was taken back" if options.resumes else "anything was armed"
+            raise StoppedError(f"stopped before {what}")
         options.watching(now, sessions)
 
     return LiveLink(FlightClock(options.speed), options.wires(options.signing), look, options.signing)
@@ -119,33 +124,67 @@ async def _prepared(
     mission: Mission, link: LiveLink, options: LiveOptions
 ) -> tuple[Mission, Rates, Preparation]:
     """Find the vehicles and have them prepared; also the mission and the rates that their wires carry."""
-    systems = await link.find(options.addresses, options.connect_timeout_s)
-    heard_on = [link.wires.address(system) for system in systems]
-    budget = plan(mission, heard_on, options.signing is not None, options.speed)
-    options.telling(str(budget))
-    mission, rates = lowered(mission, budget.rates), budget.rates
-    settings = replace(session_settings(mission), rate_hz=rates.positions, status_rate_hz=rates.status)
-    link.meet(systems, settings)
+    mission, rates = await _met(mission, link, options, None)
     preparation = Preparation(mission, link.sessions, link.clock.now(), options.adapt)
     await link.prepare(preparation)
     return mission, rates, preparation
 
 
+async def _ready(
+    mission: Mission, link: LiveLink, options: LiveOptions
+) -> tuple[Mission, Rates, Preparation | Resumed]:
+    """Vehicles that may be armed, by the operator's word.  Raises RefusedError."""
+    mission, rates, preparation = await _prepared(mission, link, options)
+    preparation.require()
+    await _confirm(preparation, link, options)
+    return mission, rates, preparation
+
+
+async def _met(
+    mission: Mission, link: LiveLink, options: LiveOptions, known: Known | None
+) -> tuple[Mission, Rates]:
+    """Find the vehicles and begin their sessions, with the rates that their wires carry."""
+    systems = await link.find(options.addresses, options.connect_timeout_s, known)
+    heard_on = [link.wires.address(system) for system in systems if system in link.wires.heard]
+    budget = plan(mission, heard_on, options.signing is not None, options.speed)
+    options.telling(str(budget))
+    mission, rates = lowered(mission, budget.rates), budget.rates
+    settings = replace(session_settings(mission), rate_hz=rates.positions, status_rate_hz=rates.status)
+    link.meet(systems, settings, known)
+    return mission, rates
+
+
+async def _found(
+    before: Resumption, link: LiveLink, options: LiveOptions
+) -> tuple[Mission, Rates, Preparation | Resumed]:
+    """Find the vehicles of a flight whose controller died.  Raises RefusedError where nobody is to be taken back."""
+    known = Known(before.systems, preflight(before.mission))
+    mission, rates = await _met(before.mission, link, options, known)
+    adoption = Adoption(mission, link.sessions, link.clock.now(), before.left)
+    await link.prepare(adoption)
+    adoption.require()
+    await _confirm(adoption, link, options)
+    adoption.judge()
+    adoption.require()
+    return mission, rates, Resumed(adoption, before)
+
+
+async def _confirm(start: Preparation | Adoption, link: LiveLink, options: LiveOptions) -> None:
+    """Have the operator say yes.  Raises RefusedError."""
+    if options.confirm is not None and not await link.wait(options.confirm(start)):
+        what = "nobody was taken back" if options.resumes else "nothing was armed"
+        raise RefusedError(f"not confirmed: {what}")
+
+
 async def _fly_prepared(
     mission: Mission, rates: Rates, seed: int, folder: RunFolder, options: LiveOptions, orders: Orders,
-    report: Report, link: LiveLink, preparation: Preparation,
+    report: Report, link: LiveLink, start: Preparation | Resumed,
 ) -> Outcome:  # fmt: skip
-    """Build the world about where the vehicles stand, and fly."""
+    """Build the world about where the vehicles stand, or stood when they took off, and fly."""
     sessions = link.sessions
-    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
-    scenario = Scenario(mission, ideal=False, stands=as_found)
-    world = scenario.world(seed)
-    describe_vehicles(world.fleet, sessions, options.own_stubs, stale_s(rates))
-    world.rules["separation"] += unsure_m(world.fleet, sessions, options.own_stubs, stale_s(rates))
-    text = f"# Flown with --seed {seed}.\n" + dump(mission)
-    folder.write_text(folder.mission, text)
-    journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
-    swarm = Swarm(mission, world, sessions, journal, preparation)
+    scenario, world = _built(mission, rates, seed, sessions, options)
+    journal = _recorder(mission, seed, folder, link, world, options)
+    swarm = Swarm(mission, world, sessions, journal, start)
     track = Track(len(sessions))
     control = ControlServer(folder.path, lambda words: obey(words, swarm, link.clock.now()))
     flight = LiveLoop(link, swarm, lambda: world.poses, journal, track, 1.0 / mission.setpoints.rate_hz)
@@ -156,9 +195,58 @@ async def _fly_prepared(
         every_s = REPORT_S * options.speed
         await flight.run(obey_and_report(swarm, world, orders, report, every_s, may_stop=options.own_stubs))
     wall = clock.wall_s() - began
+    resumed = str(options.resumes.run) if options.resumes else ""
     return Outcome(
-        mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0, options.speed
-    )
+        mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0, options.speed,
+        resumed,
+    )  # fmt: skip
+
+
+def _built(
+    mission: Mission, rates: Rates, seed: int, sessions: Sequence[Session], options: LiveOptions
+) -> tuple[Scenario, World]:
+    """The world that is flown in, with what another flight had come to if this one resumes it."""
+    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
+    scenario = Scenario(mission, ideal=False, stands=options.resumes.pads if options.resumes else as_found)
+    world = scenario.world(seed)
+    if options.resumes is not None:
+        options.resumes.give_back(world)
+    describe_vehicles(world.fleet, sessions, options.own_stubs, stale_s(rates))
+    world.rules["separation"] += unsure_m(world.fleet, sessions, options.own_stubs, stale_s(rates))
+    return scenario, world
+
+
+def _recorder(
+    mission: Mission, seed: int, folder: RunFolder, link: LiveLink, world: World, options: LiveOptions
+) -> Journal:
+    """The flight's recorder; a flight that is resumed learns where it goes on."""
+    text = f"# Flown with --seed {seed}.\n" + dump(mission)
+    folder.write_text(folder.mission, text)
+    if options.resumes is not None:
+        options.resumes.note(folder)
+    about = {**about_flight(mission, world, seed), **_about_links(link, options)}
+    journal = Journal(folder, world, text, about, flush_s=LIVE_FLUSH_S)
+    if options.resumes is not None:
+        journal.continues(options.resumes.metadata(), options.resumes.searched.seen_rows())
+    return journal
+
+
+def _about_links(link: LiveLink, options: LiveOptions) -> dict[str, str]:
+    """How the vehicles are reached, for whoever has to fly them on."""
+    before = options.resumes
+    heard = link.wires.heard
+    addresses = [
+        link.wires.address(session.system)
+        if session.system in heard or before is None
+        else before.addresses[i]
+        for i, session in enumerate(link.sessions)
+    ]
+    return {
+        "systems": " ".join(str(session.system) for session in link.sessions),
+        "connect": " ".join(map(str, addresses)),
+        "speed": f"{options.speed:g}",
+        "own_stubs": "yes" if options.own_stubs else "no",
+    }
 
 
 def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:

@@ -75,6 +75,10 @@ class Preparation:
             if finding.trouble and not finding.refuses
         ]
 
+    def told(self) -> list[str]:
+        """What the operator should see before anything is armed, a line each."""
+        return [*self.refusals.values(), *self.changes, *self.troubles]
+
     def tick(self, now: float) -> None:
         """Go on, once the sessions have taken in what arrived by ``now``."""
         if self.done or not self._settled(now):

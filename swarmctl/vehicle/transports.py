@@ -14,6 +14,7 @@ import fcntl
 import os
 import termios
 import tty
+import zlib
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -34,6 +35,8 @@ ADVICE = {
     errno.EBUSY: _BUSY,
     errno.EWOULDBLOCK: _BUSY,
 }
+OWN_PORTS = range(10000, 20000)
+"""From one of these ``udpout`` speaks, unless it is taken."""
 
 
 class TransportError(Exception):
@@ -95,10 +98,23 @@ class _UdpWire(asyncio.DatagramProtocol):
 
 
 async def _open_udp(address: Address, arrived: Arrived) -> Wire:
+    if address.kind == "udpin":
+        return await _bind_udp(address, arrived, address.host, address.port)
+    try:
+        return await _bind_udp(address, arrived, "0.0.0.0", _own_port(address))
+    except OSError:
+        return await _bind_udp(address, arrived, "0.0.0.0", 0)
+
+
+async def _bind_udp(address: Address, arrived: Arrived, host: str, port: int) -> Wire:
     loop = asyncio.get_running_loop()
-    local = (address.host, address.port) if address.kind == "udpin" else ("0.0.0.0", 0)
-    _, wire = await loop.create_datagram_endpoint(lambda: _UdpWire(address, arrived), local)
+    _, wire = await loop.create_datagram_endpoint(lambda: _UdpWire(address, arrived), (host, port))
     return wire
+
+
+def _own_port(address: Address) -> int:
+    """The port that we speak first from, the same at every start: PX4 answers only whom it heard first."""
+    return OWN_PORTS[zlib.crc32(f"{address.host}:{address.port}".encode()) % len(OWN_PORTS)]
 
 
 class _TcpWire(asyncio.Protocol):
