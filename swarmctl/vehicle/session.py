@@ -89,6 +89,15 @@ class Session(Machine):
             self._advance()
         self._schedule()
 
+    def excuse_silence(self, now: float) -> None:
+        """The caller stood still until ``now``: what did not come, or was not done, was not the vehicle's fault."""
+        self._now = self._heard_at = self._beat_at = now
+        self._answered_at = None if self._answered_at is None else now
+        self._watch.forgive()
+        if self._procedure is not None:
+            self._procedure.begin_step(now)
+        self._schedule()
+
     def check(self, preflight: Preflight) -> None:
         """Order: do this before flight, now and after every restart; READY when done.  Raises OrderError."""
         self._require(Signal.CHECK)
@@ -206,6 +215,11 @@ class Session(Machine):
     def statistics(self) -> Statistics:
         """The figures so far."""
         return self._tally.figures(self._link)
+
+    @property
+    def beat_at(self) -> float:
+        """When the last heartbeat came, or was excused."""
+        return self._beat_at
 
     @property
     def loss(self) -> float:
