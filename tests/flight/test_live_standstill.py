@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from swarmctl.core import stages
 from swarmctl.flight.live import LiveLink
+from swarmctl.flight.roster import AIRBORNE, Roster
 
 from .virtual import Live, events, outcomes
 
@@ -59,6 +61,13 @@ def test_who_has_begun_its_failsafe_is_not_taken_back(seconds: float, kept: int,
     assert all(live.down)
     assert outcome.exit_code() == 1
     assert "its mode became AUTO.RTL while engaged" in events(outcome, 2)
+
+
+def test_nothing_is_compiled_when_a_vehicle_drops_out() -> None:
+    """It would be a standstill of its own: a second on a busy machine."""
+    in_the_air = {stage for stage in range(len(stages.NAMES)) if stages.airborne(stage)}
+    assert in_the_air == AIRBORNE
+    assert "airborne" not in Roster.flies.__code__.co_names
 
 
 def test_setpoints_of_before_the_standstill_are_not_sent(

@@ -54,7 +54,7 @@ class Simulators:
     ) -> str:
         """Instance ``number``, system id one more; the URL of its own port.  It also sends to 14550."""
         assert self.px4 is not None
-        lat, lon = _place(number)
+        lat, lon = place(number)
         number += self.first
         given = {f"PX4_PARAM_{name}": f"{value:g}" for name, value in (parameters or {}).items()}
         environment = {
@@ -78,7 +78,7 @@ class Simulators:
     ) -> str:  # fmt: skip
         """Instance ``number``, system id one more, sending to UDP ``port``, or waiting on TCP; its URL."""
         assert self.arducopter is not None
-        lat, lon = _place(number)
+        lat, lon = place(number)
         number += self.first
         folder = self._folder(f"arducopter_{number}")
         lines = {**ARDUCOPTER_NEEDS, **(parameters or {})}
@@ -135,6 +135,6 @@ class Simulators:
         return folder
 
 
-def _place(number: int) -> tuple[float, float]:
+def place(number: int) -> tuple[float, float]:
     """Latitude and longitude of an instance."""
     return LAT, LON + number * SPACING_M * EAST_DEG_PER_M

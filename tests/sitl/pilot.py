@@ -113,11 +113,13 @@ class Pilot:
         self.until(lambda: "HEARTBEAT" in self.last, 10.0)
         return self
 
-    def fence_in(self, half_m: float) -> None:
-        """Put a square about where the vehicle is on board, in place of its fence."""
-        lat, lon = self.place
-        d_lat, d_lon = half_m / M_PER_DEG, half_m / (M_PER_DEG * math.cos(math.radians(lat)))
-        corners = [(lat + n * d_lat, lon + e * d_lon) for n, e in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    def fence_in(self, home: tuple[float, float], margin_m: float) -> None:
+        """Put a box about ``home`` and where the vehicle is on board, in place of its fence."""
+        d_lat, d_lon = margin_m / M_PER_DEG, margin_m / (M_PER_DEG * math.cos(math.radians(home[0])))
+        south, north = sorted((home[0], self.place[0]))
+        west, east = sorted((home[1], self.place[1]))
+        south, north, west, east = south - d_lat, north + d_lat, west - d_lon, east + d_lon
+        corners = [(south, west), (south, east), (north, east), (north, west)]
         for kind in (*REQUESTS, "MISSION_ACK"):
             self.last.pop(kind, None)
         self.say(mav.MAVLink_mission_count_message(self.system, 1, len(corners), FENCE))

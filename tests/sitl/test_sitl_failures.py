@@ -17,7 +17,7 @@ import pytest
 from swarmctl.mission.load import load
 
 from .conftest import MISSION, Flight, Fly
-from .firmware import EAST_DEG_PER_M, PX4_PORT, Simulators
+from .firmware import EAST_DEG_PER_M, PX4_PORT, Simulators, place
 from .pilot import Pilot
 
 SPEEDS = {"px4": 2.0, "ardupilot": 5.0}
@@ -165,12 +165,12 @@ FENCED: dict[str, dict[str, dict[str, float]]] = {
 
 @pytest.mark.parametrize("action", ["hold", "return"])
 def test_a_fence_on_board_that_is_broken(stage: Stage, firmware: str, action: str) -> None:
-    """A square, smaller than the mission's area, is put on board by somebody else."""
+    """A box smaller than the mission's area, about home, is put on board by somebody else."""
     scene = stage(
         "--duration", 60, parameters=FENCED[firmware][action], settings={"safety": "{if_one_fails: continue}"}
     )
     pilot = scene.pilots[1]
-    pilot.fence_in(25.0)
+    pilot.fence_in(place(1), 20.0)
     scene.told(f"vehicle {pilot.system}: its mode became")
     scene.pass_by(10.0)
     assert pilot.is_in(action) and not pilot.is_in("setpoints")  # not silently taken back
