@@ -23,7 +23,9 @@ from .options import (
 if TYPE_CHECKING:
     from .core.world import World
     from .flight.lockstep import Vehicles
+    from .flight.results import Outcome
     from .mission.model import Mission
+    from .record.folder import RunFolder
 
 LEAST_MARGIN_M = 2.0
 MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
@@ -60,12 +62,26 @@ MOST_SYSTEMS = 254  # MAVLink system ids, less the ground station's
     help="Lower what the mission asks to what its vehicles can do, and set their parameters.",
 )
 @click.option("--yes", is_flag=True, help="Do not ask (stub vehicles are never asked about).")
+@click.option(
+    "--resume",
+    "resumed",
+    type=PathArgument,
+    metavar="RUN",
+    help="Fly on where the controller of RUN died: find its vehicles, take them back, search on.",
+)
+@click.pass_context
 def fly(
-    mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int, duration: float | None,
-    speed: float | None, urls: tuple[str, ...], connect_timeout: float, backend: str, signing_key: Path | None,
-    autopilot: str | None, out: Path | None, as_json: bool, adapt: bool, yes: bool,
+    ctx: click.Context, mission_file: Path | None, algorithm: str | None, vehicles: int | None, seed: int,
+    duration: float | None, speed: float | None, urls: tuple[str, ...], connect_timeout: float, backend: str,
+    signing_key: Path | None, autopilot: str | None, out: Path | None, as_json: bool, adapt: bool, yes: bool,
+    resumed: Path | None,
 ) -> None:  # fmt: skip
     """Fly a mission and record it: stub vehicles in lockstep, or live with --speed or --connect."""
+    if resumed is not None:
+        from .resume_cli import fly_on
+
+        fly_on(resumed, ctx)
+        return
     with plain_errors(), ExitStack() as ending:
         from . import live_cli
         from .dashboard import Progress
@@ -86,7 +102,7 @@ def fly(
         ending.callback(folder.remove_if_empty)
         progress = Progress()
         with interruptible(orders, progress.say, real):
-            _warm_up(mission, name)
+            warm_up_kernels(mission, name)
             what = "vehicles" if real else "stub vehicles"
             say(f"flying {len(mission.fleet)} {what} with {name}, seed {seed}, into {folder.path}")
             with progress.shown():
@@ -106,14 +122,21 @@ def fly(
                     outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, progress)
                 else:
                     outcome = flight.fly(mission, seed, folder, _make_stubs, orders, progress.flying)
-            summary = flight.write_results(outcome, folder)
-        if as_json:
-            click.echo(json.dumps(summary, indent=2, allow_nan=False))
-        else:
-            print_summary(summary)
-        for line in outcome.complaints():
-            say(line)
-        sys.exit(outcome.exit_code())
+            conclude(outcome, folder, as_json)
+
+
+def conclude(outcome: "Outcome", folder: "RunFolder", as_json: bool) -> None:
+    """Write down and print what a flight came to, and exit."""
+    from .flight.fly import write_results
+
+    summary = write_results(outcome, folder)
+    if as_json:
+        click.echo(json.dumps(summary, indent=2, allow_nan=False))
+    else:
+        print_summary(summary)
+    for line in outcome.complaints():
+        say(line)
+    sys.exit(outcome.exit_code())
 
 
 def load_mission(
@@ -164,7 +187,7 @@ def _stub_pads(mission: "Mission") -> list[str]:
     return []
 
 
-def _warm_up(mission: "Mission", name: str) -> None:
+def warm_up_kernels(mission: "Mission", name: str) -> None:
     from .core import bind
     from .flight.fly import warm_up
 

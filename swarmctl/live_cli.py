@@ -15,11 +15,13 @@ from pathlib import Path
 import click
 
 from .dashboard import Progress, findings_table
+from .flight.adoption import Adoption
 from .flight.fly import autopilots, endurance_s
 from .flight.fly_live import LiveOptions, fly_live, probe
 from .flight.orders import Orders
 from .flight.preparation import Preparation
 from .flight.results import Outcome
+from .flight.resumption import Resumption
 from .mission.model import Mission
 from .mission.scenario import Scenario
 from .record.folder import RunFolder
@@ -58,16 +60,33 @@ def fly_connected(
 ) -> Outcome:  # fmt: skip
     """Fly vehicles that are there already.  Raises AddressError for a bad URL."""
 
-    def confirm(preparation: Preparation) -> "asyncio.Future[bool]":
-        for line in (*preparation.refusals.values(), *preparation.changes, *preparation.troubles):
-            progress.say(line)
-        return agreed() if sure else confirm_typed(preparation, progress)
+    def confirm(start: Preparation | Adoption) -> "asyncio.Future[bool]":
+        if isinstance(start, Preparation):
+            for line in (*start.refusals.values(), *start.changes, *start.troubles):
+                progress.say(line)
+        return agreed() if sure else confirm_typed(start, progress)
 
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
         watching=progress.preparing, adapt=adapt,
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
+
+
+def fly_on(
+    before: Resumption, folder: RunFolder, reach: Reach, orders: Orders, progress: Progress, *,
+    speed: float | None, sure: bool,
+) -> Outcome:  # fmt: skip
+    """Fly on where another controller died: find its vehicles, take them back.  Raises AddressError for a bad URL."""
+    mission = before.mission
+    at_urls = addresses(mission, reach.urls) if reach.urls else [[address] for address in before.addresses]
+    asks = not (sure or before.own_stubs)
+    options = LiveOptions(
+        at_urls, speed=speed or before.speed, connect_timeout_s=reach.timeout_s, own_stubs=before.own_stubs,
+        confirm=(lambda found: confirm_typed(found, progress)) if asks else None, watching=progress.preparing,
+        resumes=before,
+    )  # fmt: skip
+    return asyncio.run(fly_live(mission, before.seed, folder, options, orders, progress.flying))
 
 
 def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Progress) -> bool:
@@ -108,14 +127,33 @@ def agreed() -> "asyncio.Future[bool]":
     return answer
 
 
-def confirm_typed(preparation: Preparation, progress: Progress) -> "asyncio.Future[bool]":
+def confirm_typed(start: Preparation | Adoption, progress: Progress) -> "asyncio.Future[bool]":
     """Ask for a typed yes at the terminal."""
+    if isinstance(start, Adoption):
+        _ask_to_take_back(start, progress)
+    else:
+        _ask_to_take_off(start, progress)
+    return _typed_yes()
+
+
+def _ask_to_take_back(adoption: Adoption, progress: Progress) -> None:
+    for line in adoption.told():
+        progress.say(line)
+    names = ", ".join(str(session.system) for session in adoption.found)
+    progress.say(f"found in the air: vehicles {names}. Type yes to take them back:")
+
+
+def _ask_to_take_off(preparation: Preparation, progress: Progress) -> None:
     names = ", ".join(
         f"{system} ({findings[0].value})"
         for row, (system, findings) in enumerate(zip(preparation.systems, preparation.findings, strict=True))
         if row not in preparation.refusals
     )
     progress.say(f"ready to arm: vehicles {names}. Type yes to take off:")
+
+
+def _typed_yes() -> "asyncio.Future[bool]":
+    """Whether the next line typed is yes."""
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[bool] = loop.create_future()
 

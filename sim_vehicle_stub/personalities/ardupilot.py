@@ -348,6 +348,9 @@ class ArduPilot:
         self._pilot.limit("acceleration", self.values["WP_ACC"])
         self._pace()
 
+    def fence_changed(self) -> None:
+        """It will do."""
+
     def disarmed(self) -> None:
         """The mode stays; a failsafe is over."""
         self._failsafe = False

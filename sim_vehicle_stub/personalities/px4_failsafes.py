@@ -86,9 +86,19 @@ class Failsafes:
         if vehicle.located is self._unlocated:
             self._watch_position()
 
+    def fence_changed(self) -> None:
+        """A fence that home is not inside of is taken and told as any other, but complained of and not heeded."""
+        if not self._is_fence_valid():
+            text = "Geofence invalid, doesn't contain Home position"
+            self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, text)
+
+    def _is_fence_valid(self) -> bool:
+        fence, home = self._vehicle.fence, self._vehicle.home
+        return fence is None or home is None or not fence.broken_at(*self._vehicle.home_place)
+
     def _breaks_fence(self) -> bool:
-        east, north = self._vehicle.pilot.place[:2]
-        return self._vehicle.fence is not None and self._vehicle.fence.broken_at(east, north)
+        fence, place = self._vehicle.fence, self._vehicle.pilot.place[:2]
+        return fence is not None and fence.broken_at(*place) and self._is_fence_valid()
 
     def _watch_fence(self) -> None:
         was, self._outside = self._outside, self._breaks_fence()

@@ -30,7 +30,7 @@ MOST_CIRCLES = 40
 
 
 @kernel
-def _room(rules: Records) -> float:
+def room_of(rules: Records) -> float:
     return float(rules[0].separation + guard.SEPARATION_MARGIN_M)
 
 
@@ -141,7 +141,7 @@ def _wait(
     low, high = min(poses[i].up, errands[i].layer), max(poses[i].up, errands[i].layer)
     if now < errands[i].release_at - (high - low) / fleet[i].climb:
         return
-    other = _in_the_way(paths, i, low, high, _room(rules))
+    other = _in_the_way(paths, i, low, high, room_of(rules))
     if other >= 0:
         _step_aside(poses, i, other, wants)
         return
@@ -226,7 +226,7 @@ def _divert(
     guard_edges: Floats, rules: Records,
 ) -> None:  # fmt: skip
     """Send vehicle ``i`` to the free landing place nearest to its pad, at the height where it is."""
-    room = _room(rules) + ARRIVED_M
+    room = room_of(rules) + ARRIVED_M
     for circle in range(MOST_CIRCLES):
         for k in range(PLACES_ROUND):
             angle = 2.0 * math.pi * k / PLACES_ROUND
@@ -251,7 +251,7 @@ def _give_up_climb(
     errands[i].stage = stages.CLIMB
     last = errands[i].points - 1
     x, y = errands[i].route_east[last], errands[i].route_north[last]
-    if _adrift_at(poses, errands, x, y, _room(rules)):
+    if _adrift_at(poses, errands, x, y, room_of(rules)):
         _divert(fleet, poses, errands, i, now, plan_edges, guard_edges, rules)
 
 
@@ -261,7 +261,7 @@ def _sink(
     rules: Records, wants: Records,
 ) -> None:  # fmt: skip
     """Over its pad: claim the next layer down once the column is clear; below the last, all down to the ground."""
-    other = _climber_below(poses, errands, i, now, _room(rules))
+    other = _climber_below(poses, errands, i, now, room_of(rules))
     if other >= 0:
         _step_aside(poses, i, other, wants)
         return
@@ -270,7 +270,7 @@ def _sink(
     below = errands[i].layer - timetable.LAYER_M
     if below < LANDING_HEIGHT_M + timetable.LAYER_M:
         below = 0.0
-    if _in_the_way(paths, i, below, paths[i].high, _room(rules)) < 0:
+    if _in_the_way(paths, i, below, paths[i].high, room_of(rules)) < 0:
         errands[i].stage = stages.DESCEND
         errands[i].layer = below
         errands[i].progress_at = now
@@ -294,7 +294,7 @@ def _come_down(
     elif distance < ARRIVED_M and poses[i].up < LANDING_HEIGHT_M + 1.0:
         errands[i].stage = stages.LAND
     wants[i].up = errands[i].layer if errands[i].layer > 0.0 else min(poses[i].up, LANDING_HEIGHT_M)
-    if now - errands[i].progress_at > PATIENCE_S and _adrift_at(poses, errands, x, y, _room(rules)):
+    if now - errands[i].progress_at > PATIENCE_S and _adrift_at(poses, errands, x, y, room_of(rules)):
         _divert(fleet, poses, errands, i, now, plan_edges, guard_edges, rules)
 
 

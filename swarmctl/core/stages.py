@@ -1,4 +1,4 @@
-"""The stages of one vehicle's flight, in order; a vehicle is airborne from TAKE_OFF to LAND, and when ADRIFT."""
+"""The stages of one vehicle's flight, in order; a vehicle is airborne from TAKE_OFF to LAND, and from ADRIFT on."""
 
 from .jit import kernel
 
@@ -14,14 +14,28 @@ DESCEND = 8  # on the way down, layer by layer
 LAND = 9  # low over its pad, landing
 LANDED = 10
 ADRIFT = 11  # in the air and not ours any more: failed, released or silent; an obstacle to the others
+TAKEN = 12  # taken back wherever it was: keeps its height until it is clear of others
+LEVEL = 13  # changing to its search height, in a column that it has claimed; then it holds
 
 NAMES = (
     "ground", "take-off", "hold", "search", "wait", "climb", "transit", "over pad", "descend", "land", "landed",
-    "adrift",
+    "adrift", "taken", "level",
 )  # fmt: skip
 
 
 @kernel
 def airborne(stage: int) -> bool:
     """Whether a vehicle at this stage is in the air."""
-    return TAKE_OFF <= stage <= LAND or stage == ADRIFT
+    return TAKE_OFF <= stage <= LAND or stage >= ADRIFT
+
+
+@kernel
+def guarded(stage: int) -> bool:
+    """Whether the guard has the last word on what a vehicle at this stage is told."""
+    return SEARCH <= stage <= LAND or stage >= TAKEN
+
+
+@kernel
+def changes_height(stage: int) -> bool:
+    """Whether a vehicle at this stage may pass the heights of others, and so looks at everybody's path."""
+    return WAIT <= stage <= LAND or stage >= TAKEN

@@ -2,7 +2,7 @@
 
 import math
 
-from . import anchor, fence, guard, homing, motion, stages, wire
+from . import anchor, fence, guard, homing, levelling, motion, stages, wire
 from .arrays import Floats, Records
 from .jit import inlined_kernel, kernel
 
@@ -15,18 +15,20 @@ def _wanted_up(fleet: Records, errands: Records, poses: Records, i: int) -> floa
         return float(errands[i].wait_up)
     if stage == stages.ADRIFT:
         return float(poses[i].up)
-    if stage < stages.WAIT:
+    if stage == stages.TAKEN:
+        return levelling.kept_height(poses, errands, i)
+    if stage < stages.WAIT or stage == stages.LEVEL:
         return float(fleet[i].altitude)
     return 0.0 if stage == stages.LAND else float(errands[i].layer)
 
 
 @kernel
-def _anybody_returns(errands: Records) -> bool:
-    """Whether a vehicle is on its way home."""
-    returning = 0
+def _anybody_changes_height(errands: Records) -> bool:
+    """Whether a vehicle is on its way home, or to its search height."""
+    changing = 0
     for i in range(errands.shape[0]):
-        returning += 1 if stages.WAIT <= errands[i].stage <= stages.LAND else 0
-    return returning > 0
+        changing += 1 if stages.changes_height(errands[i].stage) else 0
+    return changing > 0
 
 
 @kernel
@@ -37,7 +39,7 @@ def steer(
     """One setpoint tick: every airborne vehicle's want, guarded, as its setpoint."""
     for i in range(fleet.shape[0]):
         anchor.settle(fleet, i, poses, rules, guard_edges, paths)
-    shown = _anybody_returns(errands)  # who looks at everybody's paths; else only neighbours do
+    shown = _anybody_changes_height(errands)  # who looks at everybody's paths; else only neighbours do
     for i in range(fleet.shape[0]):
         if shown or paths[i].near != 0:
             airborne = stages.airborne(errands[i].stage)
@@ -50,8 +52,10 @@ def steer(
             wants[i].v_east, wants[i].v_north = wishes[i].v_east, wishes[i].v_north
         elif stages.WAIT <= stage <= stages.LAND:
             homing.home(fleet, poses, errands, i, now, rules, plan_edges, guard_edges, paths, wants)
+        elif stage >= stages.TAKEN:
+            levelling.level(fleet, poses, errands, i, rules, guard_edges, paths, wants)
         setpoints[i].up = wants[i].up
-        if stages.SEARCH <= stage <= stages.LAND:
+        if stages.guarded(stage):
             guard.guard(
                 fleet, i, poses, wants[i].v_east, wants[i].v_north, rules, guard_edges, paths, sent, setpoints,
                 shown,

@@ -56,6 +56,18 @@ class ControlServer:
         writer.close()
 
 
+def is_under_way(run: Path) -> bool:
+    """Whether a flight that records into ``run`` listens; one that was killed leaves its note behind."""
+    try:
+        path = (run / NAME).read_text().strip()
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.settimeout(ANSWER_S)
+            connection.connect(path)
+    except OSError:
+        return False
+    return True
+
+
 def send(run: Path, words: list[str]) -> str:
     """Give an order to the flight that records into ``run``.  Raises ControlError."""
     note = run / NAME

@@ -153,8 +153,7 @@ def picture(outcome: Outcome) -> Picture:
     count = max(len(found_s), 1)
     east, north = outcome.track.field("east"), outcome.track.field("north")
     airborne = outcome.track.airborne
-    began = outcome.swarm.search_began
-    searching = outcome.track.times_s < (np.inf if began is None else began + outcome.searched_s)
+    searching = outcome.track.times_s < outcome.search_window_s[1]
     places = np.stack((east, north), axis=2)
     vehicles = range(east.shape[1])
     tracks = [places[airborne[:, i] & searching, i] for i in vehicles]

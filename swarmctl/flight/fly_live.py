@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarmctl.core.arrays import Floats, Records
+from swarmctl.core.world import World
 from swarmctl.mission.dump import dump
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
@@ -18,16 +19,19 @@ from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.switchboard import Switchboard
 
 from . import clock
+from .adoption import Adoption, preflight
 from .control import ControlServer
 from .errors import RefusedError, StoppedError
 from .fly import Report, about_flight, obey_and_report, session_settings
 from .inspection import CEILING_KEPT_M, place_en
 from .journal import Journal
-from .live import FlightClock, LiveLink, LiveLoop, Wires
+from .live import FlightClock, Known, LiveLink, LiveLoop, Wires
 from .orders import Orders, obey
 from .preparation import Preparation
 from .results import Outcome
+from .resumption import Resumption
 from .swarm import Swarm
+from .taking_back import Resumed
 from .track import Track
 
 LIVE_FLUSH_S = 1.0
@@ -53,7 +57,9 @@ class LiveOptions:
     connect_timeout_s: float = 20.0
     own_stubs: bool = False  #: our own stub vehicles: they fly as the mission says
     adapt: bool = False  #: lower what the mission asks to what the vehicles can do, and set their parameters
-    confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
+    confirm: Callable[[Preparation | Adoption], "asyncio.Future[bool]"] | None = None
+    """Asked before anything is armed, or taken back."""
+    resumes: Resumption | None = None  #: the flight that is flown on
     watching: Watching = lambda now, sessions: None
     wires: Callable[[], Wires] = field(default=Switchboard)
 
@@ -68,11 +74,13 @@ async def fly_live(
     with _interruptions(orders):
         link = _link(options, orders)
         with closing(link):
-            preparation = await _prepared(mission, link, options)
-            preparation.require()
-            if options.confirm is not None and not await link.wait(options.confirm(preparation)):
-                raise RefusedError("not confirmed: nothing was armed")
-            return await _fly_prepared(mission, seed, folder, options, orders, report, link, preparation)
+            if options.resumes is not None:
+                start: Preparation | Resumed = await _found(options.resumes, link, options)
+            else:
+                start = await _prepared(mission, link, options)
+                start.require()
+                await _confirm(start, link, options)
+            return await _fly_prepared(mission, seed, folder, options, orders, report, link, start)
 
 
 async def probe(mission: Mission, options: LiveOptions, orders: Orders) -> tuple[Preparation, list[str]]:
@@ -103,7 +111,8 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
 
     def look(now: float, sessions: Sequence[Session]) -> None:
         if orders.level:
-            raise StoppedError("stopped before anything was armed")
+            what = "anybody was taken back" if options.resumes else "anything was armed"
+            raise StoppedError(f"stopped before {what}")
         options.watching(now, sessions)
 
     return LiveLink(FlightClock(options.speed), options.wires(), look)
@@ -116,22 +125,36 @@ async def _prepared(mission: Mission, link: LiveLink, options: LiveOptions) -> P
     return preparation
 
 
+async def _found(before: Resumption, link: LiveLink, options: LiveOptions) -> Resumed:
+    """Find the vehicles of a flight whose controller died.  Raises RefusedError where nobody is to be taken back."""
+    mission = before.mission
+    known = Known(before.systems, preflight(mission))
+    await link.connect(options.addresses, session_settings(mission), options.connect_timeout_s, known)
+    adoption = Adoption(mission, link.sessions, link.clock.now(), before.left)
+    await link.prepare(adoption)
+    adoption.require()
+    await _confirm(adoption, link, options)
+    adoption.judge()
+    adoption.require()
+    return Resumed(adoption, before)
+
+
+async def _confirm(start: Preparation | Adoption, link: LiveLink, options: LiveOptions) -> None:
+    """Have the operator say yes.  Raises RefusedError."""
+    if options.confirm is not None and not await link.wait(options.confirm(start)):
+        what = "nobody was taken back" if options.resumes else "nothing was armed"
+        raise RefusedError(f"not confirmed: {what}")
+
+
 async def _fly_prepared(
     mission: Mission, seed: int, folder: RunFolder, options: LiveOptions, orders: Orders, report: Report,
-    link: LiveLink, preparation: Preparation,
+    link: LiveLink, start: Preparation | Resumed,
 ) -> Outcome:  # fmt: skip
-    """Build the world about where the vehicles stand, and fly."""
+    """Build the world about where the vehicles stand, or stood when they took off, and fly."""
     sessions = link.sessions
-    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
-    scenario = Scenario(mission, ideal=False, stands=as_found)
-    world = scenario.world(seed)
-    describe_vehicles(world.fleet, sessions, options.own_stubs)
-    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
-    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
-    text = f"# Flown with --seed {seed}.\n" + dump(mission)
-    folder.write_text(folder.mission, text)
-    journal = Journal(folder, world, text, about_flight(mission, world, seed), flush_s=LIVE_FLUSH_S)
-    swarm = Swarm(mission, world, sessions, journal, preparation)
+    scenario, world = _built(mission, seed, sessions, options)
+    journal = _recorder(mission, seed, folder, link, world, options)
+    swarm = Swarm(mission, world, sessions, journal, start)
     track = Track(len(sessions))
     control = ControlServer(folder.path, lambda words: obey(words, swarm, link.clock.now()))
     flight = LiveLoop(
@@ -145,9 +168,59 @@ async def _fly_prepared(
         every_s = REPORT_S * options.speed
         await flight.run(obey_and_report(swarm, world, orders, report, every_s, may_stop=options.own_stubs))
     wall = clock.wall_s() - began
+    resumed = str(options.resumes.run) if options.resumes else ""
     return Outcome(
-        mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0, options.speed
-    )
+        mission, world, scenario.regions, swarm, sessions, track, seed, wall, orders.level > 0, options.speed,
+        resumed,
+    )  # fmt: skip
+
+
+def _built(
+    mission: Mission, seed: int, sessions: Sequence[Session], options: LiveOptions
+) -> tuple[Scenario, World]:
+    """The world that is flown in, with what another flight had come to if this one resumes it."""
+    as_found = stands(mission, sessions) if mission.launch == "as_found" else None
+    scenario = Scenario(mission, ideal=False, stands=options.resumes.pads if options.resumes else as_found)
+    world = scenario.world(seed)
+    if options.resumes is not None:
+        options.resumes.give_back(world)
+    describe_vehicles(world.fleet, sessions, options.own_stubs)
+    unsure_s = UNSURE_OF_STUBS_S if options.own_stubs else UNSURE_S
+    world.rules["separation"] += unsure_s * float(world.fleet["speed"].max())
+    return scenario, world
+
+
+def _recorder(
+    mission: Mission, seed: int, folder: RunFolder, link: LiveLink, world: World, options: LiveOptions
+) -> Journal:
+    """The flight's recorder; a flight that is resumed learns where it goes on."""
+    text = f"# Flown with --seed {seed}.\n" + dump(mission)
+    folder.write_text(folder.mission, text)
+    if options.resumes is not None:
+        options.resumes.note(folder)
+    about = {**about_flight(mission, world, seed), **_about_links(link, options)}
+    journal = Journal(folder, world, text, about, flush_s=LIVE_FLUSH_S)
+    if options.resumes is not None:
+        journal.continues(options.resumes.metadata(), options.resumes.searched.seen_rows())
+    return journal
+
+
+def _about_links(link: LiveLink, options: LiveOptions) -> dict[str, str]:
+    """How the vehicles are reached, for whoever has to fly them on."""
+    before = options.resumes
+    heard = link.wires.heard
+    addresses = [
+        link.wires.address(session.system)
+        if session.system in heard or before is None
+        else before.addresses[i]
+        for i, session in enumerate(link.sessions)
+    ]
+    return {
+        "systems": " ".join(str(session.system) for session in link.sessions),
+        "connect": " ".join(map(str, addresses)),
+        "speed": f"{options.speed:g}",
+        "own_stubs": "yes" if options.own_stubs else "no",
+    }
 
 
 def stands(mission: Mission, sessions: Sequence[Session]) -> Floats:

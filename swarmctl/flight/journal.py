@@ -11,6 +11,7 @@ from swarmctl.record import rows
 from swarmctl.record.errors import RecordError
 from swarmctl.record.folder import RunFolder
 from swarmctl.record.mcap_log import Channel, McapLog
+from swarmctl.record.searched import CONTINUES
 from swarmctl.record.tlog import TlogWriter
 
 FLUSH_S = 30.0
@@ -58,8 +59,13 @@ class Journal:
         self._decisions = self._log.channel("/decisions", rows.DECISION)
         self._ticks = self._log.channel("/ticks", rows.TICK)
 
+    def continues(self, about: Mapping[str, str], seen: rows.Records) -> None:
+        """At the start of a flight that goes on where another ended: which one, and what had been seen by then."""
+        self._log.metadata(CONTINUES, about)
+        self._log.write_rows(self._log.channel("/seen", rows.SEEN), 0, 0.0, seen)
+
     def state(self, tick: int, now: float) -> None:
-        """Before a planner tick: all memory."""
+        """Before a planner tick, or at the start of a flight that goes on: all memory."""
         self._log.write_bytes("/state", tick, now, rows.dump_state(self._world))
 
     def planner_tick(self, tick: int, now: float) -> None:

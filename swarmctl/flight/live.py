@@ -9,7 +9,7 @@ without it.
 
 import asyncio
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from swarmctl.core.arrays import Records
 from swarmctl.mavlink.codec import Encoder
@@ -18,10 +18,12 @@ from swarmctl.record.errors import RecordError
 from swarmctl.vehicle.addresses import Address
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
 from swarmctl.vehicle.phases import FLYING
+from swarmctl.vehicle.preflight import Preflight
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.settings import SessionSettings
 from swarmctl.vehicle.transports import TransportError
 
+from .adoption import Adoption
 from .errors import RefusedError, StoppedError
 from .journal import Journal
 from .preparation import Preparation
@@ -67,6 +69,13 @@ class Wires(Protocol):
         """Close every wire."""
 
 
+class Known(NamedTuple):
+    """Vehicles that another controller flew: their system ids, row by row, and what each session looks at."""
+
+    systems: Sequence[int]
+    preflight: Preflight
+
+
 class FlightClock:
     """Flight time: the event loop's, from zero, ``speed`` times as fast."""
 
@@ -98,43 +107,53 @@ class LiveLink:
         self._journal: Journal | None = None
 
     async def connect(
-        self, addresses: Sequence[Sequence[Address]], settings: SessionSettings, timeout_s: float
-    ) -> None:
-        """Open ``addresses``, those of each vehicle, and wait (wall seconds) for all.  Raises RefusedError."""
+        self, addresses: Sequence[Sequence[Address]], settings: SessionSettings, timeout_s: float,
+        known: Known | None = None,
+    ) -> None:  # fmt: skip
+        """Open ``addresses``, those of each vehicle, and wait (wall seconds) for all.  Raises RefusedError.
+
+        Of ``known`` ones some may be missing; nobody else is taken for them.
+        """
         places = list(dict.fromkeys(address for own in addresses for address in own))
         try:
             await self.wires.open(places)
         except TransportError as error:
             raise RefusedError(str(error)) from None
-        await self._wait_for(addresses, timeout_s)
-        systems = self._assign(addresses)
-        if None in systems:
+        await self._wait_for(addresses, timeout_s, known)
+        systems = self._assign(addresses, known)
+        if None in systems and (known is None or not any(systems)):
             heard = ", ".join(map(str, self.wires.heard)) or "none"
             named = ", ".join(map(str, places[:6])) + (" ..." if len(places) > 6 else "")
             found = len(systems) - systems.count(None)
             raise RefusedError(
                 f"heard {found} of {len(systems)} vehicles (system ids: {heard}) on {named} within {timeout_s:g} s"
             )
-        for system in systems:
+        for system in known.systems if known else systems:
             assert system is not None
-            session = Session(system, settings=settings, now=self.clock.now())
+            session = Session(
+                system, settings=settings, now=self.clock.now(), preflight=known and known.preflight,
+                adopts=known is not None,
+            )  # fmt: skip
             self.sessions.append(session)
             self._by_system[system] = session
         self.wires.subscribe(self._take)
 
-    def _assign(self, addresses: Sequence[Sequence[Address]]) -> list[int | None]:
-        """For each vehicle the lowest system id heard at its addresses and not given away yet."""
+    def _assign(self, addresses: Sequence[Sequence[Address]], known: Known | None) -> list[int | None]:
+        """For each vehicle the lowest system id heard at its addresses and not given away yet, or its own."""
         free = list(self.wires.heard)
         systems: list[int | None] = []
-        for own in addresses:
-            system = next((s for s in free if self.wires.address(s) in own), None)
+        for row, own in enumerate(addresses):
+            wanted = free if known is None else [s for s in free if s == known.systems[row]]
+            system = next((s for s in wanted if self.wires.address(s) in own), None)
             systems.append(system)
             if system is not None:
                 free.remove(system)
         return systems
 
-    async def _wait_for(self, addresses: Sequence[Sequence[Address]], timeout_s: float) -> None:
-        """Call and listen until enough vehicles were heard, and a moment longer."""
+    async def _wait_for(
+        self, addresses: Sequence[Sequence[Address]], timeout_s: float, known: Known | None
+    ) -> None:
+        """Call and listen until enough vehicles were heard, and, unless they are known, a moment longer."""
         loop = asyncio.get_running_loop()
         caller = Encoder(GROUND_SYSTEM, GROUND_COMPONENT)
         end = loop.time() + timeout_s
@@ -143,13 +162,13 @@ class LiveLink:
             self.wires.call(caller.heartbeat(mav.MAV_TYPE_GCS, mav.MAV_AUTOPILOT_INVALID, 0, 0, 4))
             await asyncio.sleep(CALL_S)
             self._look(self.clock.now(), ())
-            if None not in self._assign(addresses):
+            if None not in self._assign(addresses, known):
                 enough_at = enough_at or loop.time()
-                if loop.time() >= enough_at + SETTLE_S:
+                if known or loop.time() >= enough_at + SETTLE_S:
                     return
 
-    async def prepare(self, preparation: Preparation) -> None:
-        """Have every session ready, inspected and fenced."""
+    async def prepare(self, preparation: Preparation | Adoption) -> None:
+        """Have every session ready, inspected and fenced; or found."""
         while not preparation.done:
             now = self.poll()
             preparation.tick(now)

@@ -37,6 +37,7 @@ class Outcome:
     wall_s: float
     aborted: bool
     speed: float | None = None  #: times real time; None in lockstep
+    resumed: str = ""  #: the folder of the flight that this one continues
 
     @property
     def found_s(self) -> Floats:
@@ -46,8 +47,17 @@ class Outcome:
 
     @property
     def searched_s(self) -> float:
-        """How long the search went on."""
+        """How long the search went on, in this flight and in those that it continues."""
         return self.swarm.planner_tick * self.mission.planner.period_s
+
+    @property
+    def search_window_s(self) -> tuple[float, float]:
+        """Flight times at which the search of this flight began and ended; without one, both infinite."""
+        began = self.swarm.search_began
+        if began is None:
+            return np.inf, np.inf
+        before_s = self.swarm.ticks_before * self.mission.planner.period_s
+        return began, began + self.searched_s - before_s
 
     def exit_code(self) -> int:
         """INTERFACE's exit code."""
@@ -116,6 +126,7 @@ class Outcome:
             "decisions": self.swarm.decisions,
             "setpoint_interval_ms": self._intervals_ms(),
             "per_vehicle": self._per_vehicle(),
+            **({"resumed": self.resumed} if self.resumed else {}),
             "run": run,
         }
 
@@ -129,11 +140,9 @@ class Outcome:
 
     def standing_fraction(self) -> float:
         """The share of the search's vehicle-ticks in which a vehicle truly stood still."""
-        began = self.swarm.search_began
-        if began is None:
-            return 0.0
+        began, ended = self.search_window_s
         times = self.track.times_s
-        during = (times >= began) & (times < began + self.searched_s)
+        during = (times >= began) & (times < ended)
         aloft = self.track.airborne[during]
         speed = np.hypot(self.track.field("v_east")[during], self.track.field("v_north")[during])
         return round(float(np.mean(speed[aloft] < STANDING_MPS)), 6) if aloft.any() else 0.0

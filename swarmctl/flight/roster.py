@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from swarmctl.core import stages
 from swarmctl.core.world import World
 from swarmctl.vehicle.events import EventKind
-from swarmctl.vehicle.phases import FLYING, Phase
+from swarmctl.vehicle.phases import FLYING, SET_UP, Phase
 from swarmctl.vehicle.procedures import ON_GROUND
 from swarmctl.vehicle.session import OrderError, Session
 
 EARS = ("sensor_range", "alarms_per_second", "radio_range")
 """What a vehicle that dropped out has no more."""
-AIRBORNE = frozenset((*range(stages.TAKE_OFF, stages.LANDED), stages.ADRIFT))
+AIRBORNE = frozenset((*range(stages.TAKE_OFF, stages.LANDED), *range(stages.ADRIFT, len(stages.NAMES))))
 """As `stages.airborne` says, which would first be compiled, in the air, with nobody steering meanwhile."""
 LOW_M = 0.5
 NOT_OURS = (Phase.RELEASED, Phase.FAILED, Phase.LOST)
@@ -28,6 +28,7 @@ class Roster:
     def __init__(self, world: World, sessions: Sequence[Session]) -> None:
         count = len(sessions)
         self.dropped: list[str | None] = [None] * count  #: refused, crashed, released or lost, once it was
+        self.by_order: set[int] = set()  #: rows of those that were released by order, or not taken back
         self.troubled = [False] * count  #: landed where it should not have, though not dropped
         self.messages: list[list[str]] = [[] for _ in sessions]  #: what happened to each vehicle, for people
         self._world, self._sessions = world, sessions
@@ -70,12 +71,17 @@ class Roster:
         """It may not be armed: the others fly without it."""
         self._drop(i, "refused")
 
+    def miss(self, i: int) -> None:
+        """It is not heard: the others fly without it."""
+        self._drop(i, "lost")
+
     def drop(self, i: int, kind: EventKind) -> None:
-        """Note how a vehicle was lost to the swarm.  One that failed in the air is told to land."""
+        """Note how a vehicle was lost to the swarm.  One that failed in the air, and was ours, is told to land."""
         session = self._sessions[i]
         outcome = {EventKind.RELEASED: "released", EventKind.LOST: "lost"}.get(kind)
         self._drop(i, outcome or self._how_it_failed(i))
-        if kind is EventKind.FAILED and session.telemetry.armed and self._landings[i] < LANDINGS_ASKED:
+        ours = session.failed_while not in SET_UP and session.telemetry.armed
+        if kind is EventKind.FAILED and ours and self._landings[i] < LANDINGS_ASKED:
             self._landings[i] += 1
             session.land()
 
@@ -102,6 +108,7 @@ class Roster:
     def take_back(self, i: int) -> None:
         """It belongs to the swarm again."""
         self.dropped[i] = None
+        self.by_order.discard(i)
         for name in EARS:
             self._world.fleet[name][i] = self._ears[name][i]
 

@@ -38,25 +38,16 @@ from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import Session
 
 from .errors import RefusedError
+from .following import Following
 from .journal import Journal
 from .preparation import Preparation
 from .roster import Roster
 from .supervision import SEARCHING, Supervision
+from .taking_back import Resumed, TakingBack, whereabouts
 
-STAGE_OF = {
-    Phase.TAKING_OFF: stages.TAKE_OFF,
-    Phase.HOLDING: stages.HOLD,
-    Phase.ENGAGING: stages.HOLD,
-    Phase.LANDING: stages.LAND,
-    Phase.LANDED: stages.LANDED,
-    Phase.STOPPING: stages.HOLD,
-    Phase.RELEASING: stages.HOLD,
-}
-GONE = (Phase.FAILED, Phase.RELEASED, Phase.LOST)
 QUIET = (EventKind.PHASE, EventKind.TEXT)
-
-
 FAILURES = (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST)
+SEARCHING_SOON = (*SEARCHING, stages.TAKEN, stages.LEVEL)
 
 
 class Part(Enum):
@@ -64,6 +55,7 @@ class Part(Enum):
 
     PREPARING = "preparing"
     TAKING_OFF = "taking off"
+    TAKING_BACK = "taking back"  #: those of a flight whose controller died
     SEARCHING = "searching"
     RETURNING = "returning"
     WATCHING = "watching"  #: ours are down; somebody else's is still in the air
@@ -71,22 +63,30 @@ class Part(Enum):
 
 
 class Swarm:
-    """One flight of ``world``'s vehicles, session i flying row i."""
+    """One flight of ``world``'s vehicles, session i flying row i.
+
+    It begins with a preparation and take-off; or it resumes another, finding its vehicles in the air and going on
+    where its search ended: ``world`` has its memory.
+    """
 
     def __init__(
         self, mission: Mission, world: World, sessions: Sequence[Session], journal: Journal,
-        preparation: Preparation,
+        start: Preparation | Resumed,
     ) -> None:  # fmt: skip
         self.part = Part.PREPARING
         self.search_began: float | None = None
         self.held = False
         self.broken_off = False  #: because of what went wrong with a vehicle
-        self.decisions = 0
+        before = start.before if isinstance(start, Resumed) else None
+        #: planner ticks of the flight that is resumed
+        self.ticks_before = before.restored.ticks if before else 0
+        self.decisions = self.ticks_before * len(sessions)
         self.roster = Roster(world, sessions)
-        self.in_range_total = 0
-        self.seen = np.zeros((len(sessions), len(world.scene.targets)), bool)  #: by each vehicle's own sensor
+        self.in_range_total = before.searched.in_range if before else 0
+        unseen = np.zeros((len(sessions), len(world.scene.targets)), bool)
+        self.seen = before.searched.first_seen >= 0 if before else unseen  #: by each vehicle's own sensor
         self._mission, self._world, self._sessions, self._journal = mission, world, sessions, journal
-        self._preparation = preparation
+        self._start = start
         origin = mission.origin
         self._origin = (origin.lat, origin.lon, origin.alt_m)
         self._wire = np.zeros((len(sessions), len(COLUMNS)))
@@ -94,8 +94,11 @@ class Swarm:
         self._state_every = max(1, round(STATE_S / mission.planner.period_s))
         self._planner_ticks = round(mission.duration_s / mission.planner.period_s)
         self._began_at = 0
-        self._released: set[int] = set()  # by order
+        self._following = Following(world, sessions, self.roster)
         self._supervision = Supervision(mission, world, sessions, self.roster, self._note)
+        self._taking_back: TakingBack | None = None
+        if isinstance(start, Resumed):
+            self._taking_back = TakingBack(start.adoption, world, sessions, self.roster, self._note)
 
     @property
     def planner_tick(self) -> int:
@@ -122,7 +125,7 @@ class Swarm:
             return
         self.resume(now)
         self._journal.event(now, 0, "return", why)
-        if self.part is not Part.SEARCHING:
+        if self.part in (Part.PREPARING, Part.TAKING_OFF):
             self.roster.land()
         else:
             self._world.orders[:] |= self._world.errands["stage"] == stages.SEARCH
@@ -158,7 +161,7 @@ class Swarm:
     def release(self, i: int, now: float) -> None:
         """Leave one vehicle to somebody else; the others fly on.  Raises OrderError."""
         self._sessions[i].release()
-        self._released.add(i)
+        self.roster.by_order.add(i)
         self._note(i, now, "release", "released by the operator")
 
     def retake(self, i: int, now: float) -> None:
@@ -166,18 +169,12 @@ class Swarm:
         self._supervision.require_inside(i)
         self._sessions[i].retake()
         self._note(i, now, "retake", "retaken by the operator")
-        self._fly_on()
-
-    def _fly_on(self) -> None:
-        """One is ours again: if all others are down, it returns."""
-        if self.part is Part.WATCHING:
-            self.part = Part.RETURNING
+        self._return_if_alone()
 
     def stood_still(self, now: float, stood_s: float) -> None:
         """The controller itself was silent for ``stood_s``."""
-        for i in range(len(self._sessions)):
-            if self.roster.flies(i):
-                self._note(i, now, "standstill", f"the controller stood still for {stood_s:.1f} s")
+        for i in filter(self.roster.flies, range(len(self._sessions))):
+            self._note(i, now, "standstill", f"the controller stood still for {stood_s:.1f} s")
 
     def _note(self, i: int, now: float, kind: str, text: str) -> None:
         """Something that the swarm did with one vehicle, for the recording and for people."""
@@ -189,7 +186,8 @@ class Swarm:
         self._take_events(now)
         self._read_telemetry(now)
         self._go_on(k, now)
-        self._follow_stages()
+        waits = self.held or self.part in (Part.TAKING_OFF, Part.TAKING_BACK)
+        self._following.follow(waits, self.part in (Part.RETURNING, Part.WATCHING))
         self._supervise(now)
         self._began_at += self.held
         ahead = k - self._began_at
@@ -222,26 +220,31 @@ class Swarm:
             if event.kind is EventKind.LOST and self.part is Part.PREPARING:
                 return  # nothing is armed: it may come back, and the preparation waits only so long
             self.roster.drop(i, event.kind)
-            if i not in self._released:
+            if i not in self.roster.by_order:
                 self._mind_the_others(event.text, now)
 
     def _mind_the_others(self, why: str, now: float) -> None:
         safety = self._mission.safety
         if safety.if_one_fails == "abort" or len(self.roster.active) < safety.minimum_vehicles:
-            self.broken_off |= self.part in (Part.TAKING_OFF, Part.SEARCHING)
+            self.broken_off |= self.part in (Part.TAKING_OFF, Part.TAKING_BACK, Part.SEARCHING)
             self.return_all(why, now)
 
     def _welcome(self, i: int) -> None:
         """A vehicle that was silent speaks again: it belongs to the swarm, unless that took off without it."""
         if self.roster.dropped[i] == "lost" and self.roster.flies(i):
             self.roster.take_back(i)
-            self._fly_on()
+            self._return_if_alone()
+
+    def _return_if_alone(self) -> None:
+        """One is ours again: if all others are down, it is to come home."""
+        if self.part is Part.WATCHING:
+            self.part = Part.RETURNING
 
     def _supervise(self, now: float) -> None:
         """Heed what no session tells."""
         if self.part is Part.SEARCHING:
             self._supervision.heed_batteries(now)
-        if self.part in (Part.SEARCHING, Part.RETURNING):
+        if self.part in (Part.TAKING_BACK, Part.SEARCHING, Part.RETURNING):
             for i in self._supervision.exhausted():
                 self._bring_down(i, now, "battery all but empty: lands where it is")
             for i in self._supervision.out_of_touch(now):
@@ -274,15 +277,19 @@ class Swarm:
         """Move on to the next part of the flight when everybody is ready for it."""
         active = self.roster.active
         if self.part is Part.PREPARING:
-            self._await_ready(now)
+            self._await_start(now)
         elif self.part is Part.TAKING_OFF:
             for session in active:
                 if session.phase is Phase.HOLDING:
                     session.engage()
             if active and all(session.phase is Phase.ENGAGED for session in active):
                 self._begin_search(k, now)
+        elif self.part is Part.TAKING_BACK and self._taking_back and self._taking_back.over(now):
+            self._begin_search(k, now)
         elif self.part is Part.SEARCHING and not self._anybody_searches():
             self.part = Part.RETURNING
+        if self._taking_back is not None and self.part is not Part.OVER:
+            self._taking_back.tick(now)
         ends = self.part in (Part.RETURNING, Part.WATCHING) or not self.roster.active
         if ends and self.part is not Part.OVER and not self.roster.anybody_flies_for_us:
             self._watch(now)
@@ -303,21 +310,30 @@ class Swarm:
             )
 
     def _anybody_searches(self) -> bool:
-        return any(stage in SEARCHING for stage in self._world.errands["stage"].tolist())
+        return any(stage in SEARCHING_SOON for stage in self._world.errands["stage"].tolist())
 
-    def _await_ready(self, now: float) -> None:
+    def _await_start(self, now: float) -> None:
+        """Take off when the preparation is over, or take back those that are in the air already."""
+        if isinstance(self._start, Preparation):
+            self._await_ready(self._start, now)
+        elif self._taking_back is not None:
+            self.part = Part.TAKING_BACK
+            self._journal.state(self.ticks_before, now)
+            self._taking_back.begin(now)
+
+    def _await_ready(self, preparation: Preparation, now: float) -> None:
         """Take off when the preparation is over.  Raises RefusedError if it refuses one that is needed."""
-        self._preparation.tick(now)
-        if not self._preparation.done:
+        preparation.tick(now)
+        if not preparation.done:
             return
-        self._preparation.require()
-        for i in self._preparation.refusals:
+        preparation.require()
+        for i in preparation.refusals:
             if self.roster.dropped[i] is None:
                 self.roster.refuse(i)
-                self._note(i, now, "refused", self._preparation.refusals[i])
+                self._note(i, now, "refused", preparation.refusals[i])
         if all(session.phase is Phase.READY for session in self.roster.active):
             self._take_off(now)
-        elif now > self._preparation.deadline:
+        elif now > preparation.deadline:
             late = [s for s in self.roster.active if s.phase is not Phase.READY]
             raise RefusedError("\n".join(f"vehicle {s.system} is {s.phase.value} again" for s in late))
 
@@ -331,37 +347,28 @@ class Swarm:
 
     def _begin_search(self, k: int, now: float) -> None:
         """The barrier opens: from this tick on everybody follows its planner."""
-        self._world.prepare()
-        engaged = [session.phase is Phase.ENGAGED for session in self._sessions]
-        self._world.errands["stage"][engaged] = stages.SEARCH
-        self.part, self.search_began, self._began_at = Part.SEARCHING, now, k
-        self._journal.event(now, 0, "search", "all vehicles are up")
-
-    def _follow_stages(self) -> None:
-        """Stages that firmware flies follow the session; those that the loop flies are the loop's own."""
-        errands = self._world.errands
-        for i, session in enumerate(self._sessions):
-            stage = STAGE_OF.get(session.phase)
-            if stage is not None:
-                errands[i]["stage"] = stage
-            elif session.phase in GONE:
-                errands[i]["stage"] = stages.ADRIFT if self.roster.aloft(i) else stages.GROUND
-            elif session.phase is Phase.ENGAGED and errands[i]["stage"] == stages.LAND:
-                session.land()
-            elif session.phase is Phase.ENGAGED:
-                self._rejoin(i)
-
-    def _rejoin(self, i: int) -> None:
-        """A vehicle that was silent or released obeys again: it does what the others do."""
+        if self.ticks_before == 0:
+            self._world.prepare()
+        engaged = np.array([session.phase is Phase.ENGAGED for session in self._sessions])
         stage = self._world.errands["stage"]
-        if self.roster.dropped[i] == "released":
-            self._released.discard(i)
-            self.roster.take_back(i)
-        elif stage[i] != stages.ADRIFT:
-            return
-        waits = self.held or self.part is Part.TAKING_OFF
-        stage[i] = stages.HOLD if waits else stages.SEARCH
-        self._world.orders[i] = self.part is Part.RETURNING
+        stage[engaged & (stage == stages.HOLD)] = stages.SEARCH
+        self.part, self.search_began = Part.SEARCHING, now
+        self._began_at = k - self.ticks_before * self._period
+        self._journal.event(now, 0, "search", f"all vehicles are up; planner tick {self.ticks_before}")
+        if isinstance(self._start, Resumed):
+            self._go_on_as_ordered(self._start.before.order, now)
+
+    def _go_on_as_ordered(self, order: str, now: float) -> None:
+        """Resumed: what had been ordered still holds, and so does how many are needed."""
+        searching = np.count_nonzero(np.isin(self._world.errands["stage"], SEARCHING_SOON))
+        if order == "hold":
+            self.hold(now)
+        elif order == "land":
+            self.land_all(now)
+        elif order == "return":
+            self.return_all("as before the controller died", now)
+        elif searching < self._mission.safety.minimum_vehicles:
+            self.return_all("too few vehicles are left", now)
 
     def _plan(self, tick: int, now: float) -> None:
         """Sense → know ⇄ radio → plan, for everybody."""
@@ -390,10 +397,3 @@ class Swarm:
         self._journal.after_steering(k, now)
         for session, (v_east, v_north, up, _) in zip(self._sessions, world.setpoints.tolist(), strict=True):
             session.setpoint(v_east, v_north, up)
-
-
-def whereabouts(session: Session) -> str:
-    """Where a vehicle was last, for those who have to look for it."""
-    t = session.telemetry
-    mode = session.adapter.modes.name(t.mode) if session.adapter else "unknown mode"
-    return f"{session.phase.value}, {mode}, last at {t.lat_e7 * 1e-7:.6f}, {t.lon_e7 * 1e-7:.6f}, {t.height_m:.0f} m up"

@@ -11,6 +11,7 @@ from swarmctl.mission.load import load
 from . import mcap_read, rows
 from .folder import RunFolder
 from .replay import as_now, open_world
+from .searched import CONTINUES, searched
 from .summary import time_to
 from .tracks import Picture, draw, subtitle_of
 
@@ -23,20 +24,18 @@ def redraw(folder: RunFolder) -> Path:
     world = open_world(log)
     period = float(world.rules[0]["period"])
     targets = world.scene.targets
-    found = np.full(len(targets), np.inf)
+    first = searched(log, len(world.fleet), len(targets)).found
+    found = np.where(first < 0, np.inf, first * period)
     places: list[list[tuple[float, float]]] = [[] for _ in world.fleet]
     homeward: list[list[tuple[float, float]]] = [[] for _ in world.fleet]
-    ticks = 0
+    ticks = int(log.metadata.get(CONTINUES, {}).get("ticks", "0"))
     for message in log.rows("/observations", "/ticks"):
         if message.topic == "/observations":
-            serials = as_now(message.rows, rows.OBSERVATION, "/observations")["id"]
-            serials = serials[serials < len(targets)]
-            found[serials] = np.minimum(found[serials], message.tick * period)
             ticks = message.tick + 1
             continue
         for i, row in enumerate(as_now(message.rows, rows.TICK, "/ticks")):
-            if stages.TAKE_OFF <= row["stage"] <= stages.LAND:
-                part = places if row["stage"] <= stages.SEARCH else homeward
+            if stages.airborne(row["stage"]) and row["stage"] != stages.ADRIFT:
+                part = homeward if stages.WAIT <= row["stage"] <= stages.LAND else places
                 part[i].append((row["east"], row["north"]))
     ordered = np.sort(found[np.isfinite(found)])
     count = max(len(targets), 1)

@@ -8,6 +8,7 @@ as identical if the wish and every setpoint until the next decision are.
 
 import json
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -21,7 +22,8 @@ from . import rows
 from .errors import LogError
 from .mcap_read import Log, Rows
 
-HOMING = (stages.CLIMB, stages.TRANSIT, stages.OVER_PAD, stages.DESCEND)
+OUTPUTS = (stages.CLIMB, stages.TRANSIT, stages.OVER_PAD, stages.DESCEND, stages.LEVEL)
+"""Stages that steering itself moves a vehicle on to."""
 ONCE = ("/rules", "/fleet", "/settings", "/targets", "/fence")
 
 
@@ -80,6 +82,12 @@ def as_now(recorded: Records, dtype: np.dtype[Any], topic: str) -> Records:
     return converted
 
 
+def require_below(limit: int, values: Records, topic: str) -> None:
+    """Raise LogError for an index that would lead out of an array."""
+    if len(values) and not (values.min() >= 0 and values.max() < limit):
+        raise LogError(f"{topic}: a number is out of range; the recording was tampered with")
+
+
 def open_world(log: Log, algorithm: str | None = None) -> World:
     """The world of a recording, at its start; with another algorithm, that one's own default settings."""
     found: dict[str, Records] = {}
@@ -124,15 +132,49 @@ def replay(log: Log, algorithm: str | None = None) -> Replayed:
     """
     other = algorithm is not None and algorithm != log.metadata.get("flight", {}).get("algorithm")
     replayer = _Replayer(open_world(log, algorithm), other)
+    for message, pending in _whole_ticks(log):
+        replayer.tick(message, pending)
+    replayer.result.truncated = log.truncated
+    return replayer.finish()
+
+
+@dataclass(frozen=True)
+class Restored:
+    """The world as it was after the last whole planner tick of a recording, ``ticks`` being how many there were.
+
+    ``exact``: what was done again since the last snapshot came out as recorded.
+    """
+
+    world: World
+    ticks: int
+    exact: bool
+
+
+def restore(log: Log) -> Restored:
+    """Memory at the end of a recording: that of the last snapshot, and the planner ticks after it done again."""
+    since: list[tuple[Rows, dict[str, Rows]]] = []
+    for message, pending in _whole_ticks(log):
+        if "/state" in pending:
+            since.clear()
+        if "/state" in pending or "/decisions" in pending:
+            since.append((message, pending))
+    replayer = _Replayer(open_world(log), other=False, steers=False)
+    ticks = 0
+    for message, pending in since:
+        replayer.tick(message, pending)
+        ticks = pending["/decisions"].tick + 1 if "/decisions" in pending else pending["/state"].tick
+    return Restored(replayer.world, ticks, replayer.finish().same)
+
+
+def _whole_ticks(log: Log) -> Iterator[tuple[Rows, dict[str, Rows]]]:
+    """Every setpoint tick that is all there, with what was recorded just before it, by topic."""
     pending: dict[str, Rows] = {}
     for message in log.rows():
         if message.topic == "/ticks":
-            replayer.tick(message, pending)
-            pending.clear()
+            yield message, pending
+            pending = {}
         elif message.topic not in ONCE:
             pending[message.topic] = message
-    replayer.result.truncated = log.truncated
-    return replayer.finish()
 
 
 @dataclass
@@ -141,8 +183,10 @@ class _Replayer:
 
     world: World
     other: bool
+    steers: bool = True
     result: Replayed = field(default_factory=Replayed)
     begun: bool = False
+    launched: bool = False  # its planners have memory
     apart_mps: float = 0.0
 
     def __post_init__(self) -> None:
@@ -153,9 +197,11 @@ class _Replayer:
         recorded = as_now(message.rows, rows.TICK, "/ticks")
         for name in state.POSE.names or ():
             self.world.poses[name] = recorded[name]
+        if "/state" in pending and not self.other:
+            self._take_state(pending["/state"])
         if "/decisions" in pending:
             self._plan(pending)
-        if not self.other:
+        if self.steers and not self.other:
             self._steer(message, recorded)
 
     def finish(self) -> Replayed:
@@ -170,10 +216,9 @@ class _Replayer:
         world, decided = self.world, pending["/decisions"]
         tick = decided.tick
         self.finish()
-        if not self.begun and self.result.decisions == 0:
+        if not self.launched:
+            self.launched = True
             world.prepare()
-        if "/state" in pending and not self.other:
-            self._check_state(tick, decided.time_s, pending["/state"].rows.tobytes())
         self._give_reports(as_now(pending["/observations"].rows, rows.OBSERVATION, "/observations"))
         self.begun = True
         self.good[:] = True
@@ -191,21 +236,27 @@ class _Replayer:
         self.apart_mps += float(lengths[np.isfinite(lengths)].sum())
         self._compare("plan", tick, decided.time_s, recorded, rows.decisions(world))
 
-    def _check_state(self, tick: int, time_s: float, recorded: bytes) -> None:
+    def _take_state(self, snapshot: Rows) -> None:
         """Compare all chained memory with the recorded snapshot, then go on from that."""
-        world = self.world
+        world, recorded = self.world, snapshot.rows.tobytes()
+        self.finish()
+        self.launched = True
         if self.result.decisions and rows.dump_state(world) != recorded:
             self.result.identical -= int(self.good.sum())
             if self.result.first_difference is None:
-                self.result.first_difference = {"stage": "memory", "tick": tick, "time_s": time_s}
+                self.result.first_difference = {
+                    "stage": "memory",
+                    "tick": snapshot.tick,
+                    "time_s": snapshot.time_s,
+                }
         try:
             rows.load_state(world, recorded)
         except (ValueError, IndexError):
             raise LogError("/state: recorded by a version with other memory; use that version") from None
 
     def _give_reports(self, recorded: Records) -> None:
-        self._require(recorded["vehicle"], len(self.world.fleet), "/observations")
-        self._require(recorded["id"], self.world.serials, "/observations")
+        require_below(len(self.world.fleet), recorded["vehicle"], "/observations")
+        require_below(self.world.serials, recorded["id"], "/observations")
         self.world.report_count[:] = 0
         for row in recorded:
             vehicle = int(row["vehicle"])
@@ -214,15 +265,9 @@ class _Replayer:
                 place[name] = row[name]
             self.world.report_count[vehicle] += 1
 
-    @staticmethod
-    def _require(values: Records, limit: int, topic: str) -> None:
-        """Raise LogError for an index that would lead a kernel out of its arrays."""
-        if len(values) and not (values.min() >= 0 and values.max() < limit):
-            raise LogError(f"{topic}: a number is out of range; the recording was tampered with")
-
     def _give_heard(self, recorded: Records, slot: int) -> None:
         for name in ("receiver", "sender"):
-            self._require(recorded[name], len(self.world.fleet), "/heard")
+            require_below(len(self.world.fleet), recorded[name], "/heard")
         senders: dict[int, list[int]] = defaultdict(list)
         for receiver, sender in recorded.tolist():
             senders[receiver].append(sender)
@@ -245,9 +290,9 @@ class _Replayer:
         self.result.setpoints_identical += same
 
     def _check_stages(self, message: Rows, recorded: Records) -> None:
-        """Homing's own steps are outputs: where the recording shows one, the last tick must have led there."""
-        wrong = np.isin(recorded, HOMING) & (recorded != self.world.errands["stage"])
-        wrong &= np.isin(self.world.errands["stage"], (stages.WAIT, *HOMING))
+        """Steering's own steps are outputs: where the recording shows one, the last tick must have led there."""
+        wrong = np.isin(recorded, OUTPUTS) & (recorded != self.world.errands["stage"])
+        wrong &= np.isin(self.world.errands["stage"], (stages.WAIT, stages.TAKEN, *OUTPUTS))
         self.good &= ~wrong
         if wrong.any() and self.result.first_difference is None:
             i = int(np.flatnonzero(wrong)[0])

@@ -1,12 +1,14 @@
 """What flight.mcap holds, topic by topic: written by the flight, read by replay, report and map.
 
 /rules /fleet /settings /targets /fence     once, at the start: all that a replay needs of the mission
+/seen             once, of a flight that continues another: which vehicle had seen which target, and when first
 /observations     a planner tick: every sensor report, with the vehicle that made it
 /beacons          a planner tick: what each vehicle tells
 /heard            a planner tick: whose beacon reached whom (they arrive after the radio's delay)
 /decisions        a planner tick: what each vehicle then knows, and the velocity it wishes
 /ticks            a setpoint tick: pose, stage, want, and the guarded setpoint of each vehicle
-/state            every 10 s, before a planner tick: all memory, from which replay goes on
+/state            every 10 s, before a planner tick, and at the start of a flight that continues another: all memory,
+                  from which replay goes on
 /events           as they happen, JSON
 """
 
@@ -21,6 +23,7 @@ from swarmctl.core.world import World
 Records = NDArray[Any]
 
 OBSERVATION = np.dtype([("vehicle", "<i8"), *state.CONTACT.descr])
+SEEN = np.dtype([("vehicle", "<i8"), ("target", "<i8"), ("tick", "<i8")])
 HEARD = np.dtype([("receiver", "<i8"), ("sender", "<i8")])
 DECISION = np.dtype([("known", "<i8"), ("before", "<i8"), ("in_range", "<i8"), *state.WISH.descr])
 TICK = np.dtype(

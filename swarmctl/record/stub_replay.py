@@ -20,6 +20,7 @@ from . import mcap_read
 from .errors import LogError
 from .folder import RunFolder
 from .replay import open_world
+from .searched import CONTINUES
 from .tlog_read import read_frames
 
 GROUND_SYSTEM = 255
@@ -79,6 +80,10 @@ def replay_stub(folder: RunFolder, make_vehicles: MakeVehicles) -> Compared:
     """Fly the recorded commands and setpoints again.  Raises LogError for a damaged recording."""
     log = mcap_read.read(folder.mcap)
     world = open_world(log)
+    if CONTINUES in log.metadata:
+        raise LogError(
+            f"{folder.mcap}: resumed a flight, and began in the air: fresh stubs stand on the ground"
+        )
     interval = float(world.rules[0]["interval"])
     about = yaml.safe_load(log.attachments.get("mission.yaml", "{}"))
     origin = about["origin"]

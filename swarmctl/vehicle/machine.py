@@ -12,7 +12,7 @@ from .autopilots.registry import ADAPTERS, adapter_for, autopilot_name
 from .commands import Ask
 from .events import Event, EventKind, TextAssembler
 from .link import Link
-from .phases import STREAMING, TABLE, Action, Phase, Signal
+from .phases import SETTING_UP, STREAMING, TABLE, Action, Phase, Signal
 from .preflight import Checks, Preflight
 from .settings import SessionSettings
 from .statistics import Tally
@@ -25,17 +25,22 @@ BEATS_LOST = 3
 
 
 class Machine:
-    """One vehicle's walk through the table.  Its times are the caller's, its durations on the caller's clock."""
+    """One vehicle's walk through the table.  Its times are the caller's, its durations on the caller's clock.
+
+    ``adopts``: another controller took the vehicle off, and it may be in the air: it is set up as it is found.
+    """
 
     def __init__(
-        self, system: int, *, settings: SessionSettings, now: float, preflight: Preflight | None = None
-    ) -> None:
+        self, system: int, *, settings: SessionSettings, now: float, preflight: Preflight | None = None,
+        adopts: bool = False,
+    ) -> None:  # fmt: skip
         self.system = system
         self.phase = Phase.CONNECTING
         self.reason = ""  #: why it FAILED or was RELEASED
         self.failed_while: Phase | None = None  #: the phase in which it last failed
         self.telemetry = Telemetry()
         self.adapter: Adapter | None = None
+        self._adopts = adopts
         self._settings = settings.on_clock()
         self._now = now
         self._link = Link(system)
@@ -113,8 +118,19 @@ class Machine:
             self._procedure = None
             if procedure.failure:
                 self.reason = procedure.failure
-            self._signal(Signal.STEP_FAILED if procedure.failure else Signal.STEPS_DONE)
+            self._signal(self._failed() if procedure.failure else self._done())
         self._schedule()
+
+    def _failed(self) -> Signal:
+        """A phase has failed; to set up a vehicle that another controller took off may do so in the air."""
+        in_flight = self._adopts and self.phase in SETTING_UP and self.telemetry.armed
+        return Signal.FAILED_IN_FLIGHT if in_flight else Signal.STEP_FAILED
+
+    def _done(self) -> Signal:
+        """A phase's steps are done; of a vehicle that another controller took off, in the air or after landing."""
+        if not self._adopts or self.phase is not Phase.CHECKING:
+            return Signal.STEPS_DONE
+        return Signal.CHECKED_IN_FLIGHT if self.telemetry.armed else Signal.CHECKED_LANDED
 
     @property
     def _suspended(self) -> bool:
@@ -132,10 +148,10 @@ class Machine:
         if self.adapter is None:
             known = ", ".join(autopilot_name(number) for number in ADAPTERS)
             self.reason = f"its autopilot is {autopilot_name(self._autopilot)}; can fly: {known}"
-            self._signal(Signal.STEP_FAILED)
+            self._signal(self._failed())
         elif self._set_ups > self._settings.set_up_attempts:
             self.reason = f"its set-up was broken off {self._set_ups - 1} times"
-            self._signal(Signal.STEP_FAILED)
+            self._signal(self._failed())
         else:
             self._begin(procedures.identifying(self._settings))
 
@@ -143,7 +159,8 @@ class Machine:
         self._begin(procedures.configuring(self._known_adapter(), self._settings))
 
     def _locate(self) -> None:
-        self._begin(procedures.positioning(self._known_adapter(), self._settings))
+        steps = procedures.finding if self._adopts else procedures.positioning
+        self._begin(steps(self._known_adapter(), self._settings))
 
     def _check(self) -> None:
         self._begin(self._checks.begin(self._known_adapter()))
@@ -153,10 +170,16 @@ class Machine:
         self._begin(procedures.taking_off(adapter, self.telemetry, self._altitude_m, self._settings))
 
     def _engage(self) -> None:
-        self._begin(procedures.engaging(self._known_adapter(), self._settings))
+        modes = self._known_adapter().modes
+        ours = frozenset((modes.take_off, modes.hold, modes.engaged))
+        self._begin(procedures.engaging(self._known_adapter(), self._settings, ours))
+
+    def _adopt(self) -> None:
+        adapter = self._known_adapter()
+        self._begin(procedures.engaging(adapter, self._settings, adapter.modes.unattended))
 
     def _retake(self) -> None:
-        self._begin(procedures.engaging(self._known_adapter(), self._settings, retaking=True))
+        self._begin(procedures.engaging(self._known_adapter(), self._settings, None))
 
     def _stop(self) -> None:
         self._begin(procedures.stopping(self._known_adapter(), self._settings))

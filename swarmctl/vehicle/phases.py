@@ -18,6 +18,7 @@ class Phase(Enum):
     POSITIONING = "positioning"  #: position, origin, home, health
     CHECKING = "checking"  #: parameters, and the vehicle's own fence, if the caller wants
     READY = "ready"  #: on the ground; may take off
+    FOUND = "found in the air"  #: set up there, and not ours: its failsafe flies it, or a pilot
     TAKING_OFF = "taking off"
     HOLDING = "holding"  #: at altitude, in the firmware's own hold
     ENGAGING = "engaging"  #: hold setpoints flow, offboard mode is asked for
@@ -37,8 +38,13 @@ class Signal(Enum):
     HEARTBEAT = "heartbeat"
     STEPS_DONE = "steps done"
     STEP_FAILED = "step failed"
+    CHECKED_IN_FLIGHT = "steps done, in the air"
+    CHECKED_LANDED = "steps done, had landed"
+    FAILED_IN_FLIGHT = "step failed, in the air"
     CHECK = "order: check"
     TAKE_OFF = "order: take off"
+    ADOPT = "order: adopt"
+    DECLINE = "order: decline"
     ENGAGE = "order: engage"
     HOLD = "order: hold"
     LAND = "order: land"
@@ -63,6 +69,7 @@ class Action(Enum):
     CHECK = "check"
     TAKE_OFF = "take_off"
     ENGAGE = "engage"
+    ADOPT = "adopt"
     RETAKE = "retake"
     STOP = "stop"
     LAND = "land"
@@ -80,16 +87,19 @@ class Transition(NamedTuple):
     phase: Phase | None
 
 
-SET_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.CHECKING, Phase.READY)
-LOCATED = (Phase.POSITIONING, Phase.CHECKING, Phase.READY)  # on the ground, once a position has come
+SETTING_UP = (Phase.IDENTIFYING, Phase.CONFIGURING, Phase.POSITIONING, Phase.CHECKING)
+SET_UP = (*SETTING_UP, Phase.READY, Phase.FOUND)
+LOCATED = (
+    Phase.POSITIONING,
+    Phase.CHECKING,
+    Phase.READY,
+    Phase.FOUND,
+)  # not ours yet, once a position has come
 STREAMING = (Phase.ENGAGING, Phase.STOPPING, Phase.RELEASING)
 AIRBORNE = (Phase.TAKING_OFF, Phase.HOLDING, Phase.ENGAGED, *STREAMING)
 FLYING = (*AIRBORNE, Phase.LANDING)
 FAILING = (
-    Phase.IDENTIFYING,
-    Phase.CONFIGURING,
-    Phase.POSITIONING,
-    Phase.CHECKING,
+    *SETTING_UP,
     Phase.TAKING_OFF,
     Phase.ENGAGING,
     Phase.STOPPING,
@@ -108,6 +118,11 @@ def _table() -> Table:
         (Phase.CONFIGURING, Signal.STEPS_DONE): Transition(Action.LOCATE, Phase.POSITIONING),
         (Phase.POSITIONING, Signal.STEPS_DONE): Transition(Action.CHECK, Phase.CHECKING),
         (Phase.CHECKING, Signal.STEPS_DONE): Transition(Action.REST, Phase.READY),
+        (Phase.CHECKING, Signal.CHECKED_IN_FLIGHT): Transition(Action.REST, Phase.FOUND),
+        (Phase.CHECKING, Signal.CHECKED_LANDED): Transition(Action.REST, Phase.LANDED),
+        (Phase.FOUND, Signal.ADOPT): Transition(Action.ADOPT, Phase.ENGAGING),
+        (Phase.FOUND, Signal.DECLINE): Transition(Action.RELEASE, Phase.RELEASED),
+        (Phase.FOUND, Signal.DISARMED): Transition(Action.REST, Phase.LANDED),
         (Phase.READY, Signal.CHECK): Transition(Action.CHECK, Phase.CHECKING),
         (Phase.READY, Signal.TAKE_OFF): Transition(Action.TAKE_OFF, Phase.TAKING_OFF),
         (Phase.TAKING_OFF, Signal.STEPS_DONE): Transition(Action.REST, Phase.HOLDING),
@@ -126,6 +141,7 @@ def _table() -> Table:
     }
     shared: tuple[tuple[tuple[Phase, ...], Signal, Action, Phase], ...] = (
         (FAILING, Signal.STEP_FAILED, Action.FAIL, Phase.FAILED),
+        (SETTING_UP, Signal.FAILED_IN_FLIGHT, Action.RELEASE, Phase.RELEASED),
         ((Phase.ENGAGING, Phase.ENGAGED), Signal.HOLD, Action.STOP, Phase.STOPPING),
         ((*AIRBORNE, Phase.FAILED), Signal.LAND, Action.LAND, Phase.LANDING),
         (AIRBORNE, Signal.RELEASE, Action.STOP, Phase.RELEASING),

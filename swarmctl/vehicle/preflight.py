@@ -28,11 +28,13 @@ class Preflight:
     """What to do before READY.  The fence is the firmware's own; None leaves it as it is.
 
     ``remedies``: parameters to set, of those that were read before.
+    ``upload``: set the fence; else it must be on board already, as in the air, where nobody changes it.
     """
 
     read_parameters: bool = False
     fence: Fence | None = None
     remedies: tuple[Remedy, ...] = ()
+    upload: bool = True
 
 
 class Checks:
@@ -101,7 +103,7 @@ class Checks:
             "fence read back", patience, command=FenceReading(transfer), confirmed=lambda t: transfer.verified,
             failed=transfer.difference, insists=True,
         )  # fmt: skip
-        return (upload, reading)
+        return (upload, reading) if self._preflight.upload else (reading,)
 
     def take(self, frame: Frame, bytewise: bool) -> bool:
         """Take in a message of these exchanges and reply; whether it was one."""

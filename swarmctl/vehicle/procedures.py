@@ -14,6 +14,9 @@ from .telemetry import Telemetry
 
 ON_GROUND: int = mav.MAV_LANDED_STATE_ON_GROUND
 IN_AIR: int = mav.MAV_LANDED_STATE_IN_AIR
+LANDING: int = mav.MAV_LANDED_STATE_LANDING
+LET_LAND_M = 5.0
+"""One that was lower when it was found landing is let land."""
 
 Steps = tuple[Step, ...]
 
@@ -64,6 +67,23 @@ def _rates(adapter: Adapter, settings: SessionSettings, on_failure: OnFailure) -
 
 def positioning(adapter: Adapter, settings: SessionSettings) -> Steps:
     """Every message that flight needs has come, and the vehicle stands on the ground, ready to arm."""
+    return (
+        *_messages(adapter, settings, _stands),
+        *adapter.prepare(settings),
+        _gate(adapter, settings),
+    )
+
+
+def finding(adapter: Adapter, settings: SessionSettings) -> Steps:
+    """The same of a vehicle that another controller took off: it flies, or has landed, and nothing is changed.
+
+    One that is about to touch down is let land.
+    """
+    return _messages(adapter, settings, flies_on_or_has_landed)
+
+
+def _messages(adapter: Adapter, settings: SessionSettings, standing: Condition) -> Steps:
+    """Every message that flight needs has come; ``standing``: what the vehicle has to say of the ground."""
     patience = settings.ready_patience_s
     rates = wanted_rates(adapter, settings)
     origin = _requested(
@@ -78,13 +98,17 @@ def positioning(adapter: Adapter, settings: SessionSettings) -> Steps:
 
     return (
         streamed("position", mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, lambda t: t.positioned),
-        streamed("standing", mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, _stands),
+        streamed("standing", mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, standing),
         streamed("system status", mav.MAVLINK_MSG_ID_SYS_STATUS, lambda t: t.status_received),
         *((origin,) if adapter.needs_origin else ()),
         _requested("home", mav.MAVLINK_MSG_ID_HOME_POSITION, patience, lambda t: t.home is not None),
-        *adapter.prepare(settings),
-        _gate(adapter, settings),
     )
+
+
+def flies_on_or_has_landed(t: Telemetry) -> bool:
+    """Not on the last metres of a landing, nor on the ground with motors that still run."""
+    low = t.landed_state == LANDING and t.height_m < LET_LAND_M
+    return t.landed_state != 0 and (not t.armed or not (low or t.landed_state == ON_GROUND))
 
 
 def _gate(adapter: Adapter, settings: SessionSettings) -> Step:
@@ -130,13 +154,12 @@ def taking_off(adapter: Adapter, telemetry: Telemetry, altitude_m: float, settin
     return (*adapter.take_off(telemetry, altitude_m, settings), climb)
 
 
-def engaging(adapter: Adapter, settings: SessionSettings, retaking: bool = False) -> Steps:
+def engaging(adapter: Adapter, settings: SessionSettings, ours: frozenset[int] | None) -> Steps:
     """Hold setpoints flow for a while, then the mode is changed.
 
-    ``retaking``: from whatever mode somebody else chose.
+    ``ours``: the modes from which that is meant; None is any, whoever chose it.
     """
     modes = adapter.modes
-    ours = None if retaking else frozenset((modes.take_off, modes.hold, modes.engaged))
     return (
         Step("setpoint stream", settings.command_patience_s, wait_s=settings.stream_s, modes=ours),
         Step(

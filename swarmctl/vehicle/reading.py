@@ -38,6 +38,15 @@ def _date(telemetry: Telemetry, boot_ms: int, now: float) -> None:
     telemetry.boot_ms = boot_ms
 
 
+def read_clock(telemetry: Telemetry, asked_at: float, vehicle_s: float) -> None:
+    """A ping that left at ``asked_at`` was answered when the vehicle's clock showed ``vehicle_s``.
+
+    So the clocks are at least so far apart by now.  A simulator that cannot keep up falls behind by seconds in a
+    flight, and without this its positions would seem ever older.
+    """
+    telemetry.clock_offset_s = max(telemetry.clock_offset_s, asked_at - vehicle_s)
+
+
 def read_heartbeat(telemetry: Telemetry, fields: Any) -> None:
     """HEARTBEAT: mode and arming."""
     telemetry.mode = fields.custom_mode

@@ -12,6 +12,7 @@ What happens in the air, and what the session does about it:
   firmware's own failsafe takes over; only a landing that was ordered is still asked for, because a vehicle that
   is not heard may hear.  When the link is back, a vehicle that was being set up is set up again from the start,
   for it may have restarted; one that was flying has the phase that it had, and what telemetry then shows decides.
+- Another controller took it off and died: it is FOUND in the air, and ``adopt``ed by order.
 - Its mode is not ours: RELEASED.  A pilot or a failsafe flies it and is not fought; ``retake`` is an order.
 - It comes with heartbeats but without positions: it is landed, for nobody could keep it inside its fence.
 - It disarms, comes down unasked, or its autopilot restarts: FAILED.  On the ground a restarted vehicle is set up again.
@@ -32,8 +33,8 @@ from .machine import Machine
 from .phases import FLYING, SET_UP, TABLE, Phase, Signal
 from .preflight import Preflight
 from .protection import Protection
-from .reading import READERS, read_position
-from .statistics import Statistics
+from .reading import READERS, read_clock, read_position
+from .statistics import NANOSECONDS, Statistics
 from .steps import TIME_SLACK_S
 from .watch import RESTART_MS
 
@@ -150,18 +151,39 @@ class Session(Machine):
         self.reason = "released by order"
         self._signal(Signal.RELEASE)
 
+    def adopt(self) -> None:
+        """Order: take control of a vehicle that was FOUND in the air, at its present height.  Raises OrderError.
+
+        As ``retake``; but only from a mode in which nobody has a hand on the stick.
+        """
+        self._require(Signal.ADOPT)
+        modes, mode = self._known_adapter().modes, self.telemetry.mode
+        if mode not in modes.unattended:
+            raise OrderError(f"vehicle {self.system}: a pilot flies it in {modes.name(mode)}")
+        self._take(Signal.ADOPT)
+
+    def decline(self, reason: str) -> None:
+        """Order: leave a vehicle that was FOUND in the air to whoever flies it.  Raises OrderError."""
+        self._require(Signal.DECLINE)
+        self.reason = reason
+        self._signal(Signal.DECLINE)
+
     def retake(self) -> None:
         """Order: take control of a RELEASED vehicle, at its present height.  Raises OrderError.
 
         Refused for one that is not flying, or does not say where.
         """
-        self._require(Signal.RETAKE)
+        self._take(Signal.RETAKE)
+
+    def _take(self, signal: Signal) -> None:
+        """Take control of a vehicle that is flying and says where."""
+        self._require(signal)
         if not self.telemetry.armed or self.telemetry.landed_state == procedures.ON_GROUND:
             raise OrderError(f"vehicle {self.system}: cannot be retaken, it is not flying")
         if self._now - self.telemetry.received_at > self._settings.position_loss_s:
             raise OrderError(f"vehicle {self.system}: cannot be retaken, its position is not known")
         self._altitude_m = self.telemetry.height_m
-        self._signal(Signal.RETAKE)
+        self._signal(signal)
 
     def setpoint(self, v_east: float, v_north: float, altitude_m: float) -> bool:
         """Fly this velocity (m/s) at this height above home (m) until the next setpoint.
@@ -282,6 +304,7 @@ class Session(Machine):
         elif frame.message_id == TIMESYNC:
             if self._tally.pong(frame.fields, self._now):
                 self._answered_at = self._now
+                read_clock(self.telemetry, frame.fields.ts1 / NANOSECONDS, frame.fields.tc1 / NANOSECONDS)
         else:
             self._read_exchange(frame)
         if self._watch.battery_low(self.telemetry):

@@ -8,6 +8,7 @@ import asyncio
 import os
 import termios
 import tty
+import zlib
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -15,6 +16,8 @@ from .addresses import Address
 
 Peer = tuple[str, int] | None
 READ_BYTES = 65536
+OWN_PORTS = range(10000, 20000)
+"""From one of these ``udpout`` speaks, unless it is taken."""
 
 
 class TransportError(Exception):
@@ -76,10 +79,23 @@ class _UdpWire(asyncio.DatagramProtocol):
 
 
 async def _open_udp(address: Address, arrived: Arrived) -> Wire:
+    if address.kind == "udpin":
+        return await _bind_udp(address, arrived, address.host, address.port)
+    try:
+        return await _bind_udp(address, arrived, "0.0.0.0", _own_port(address))
+    except OSError:
+        return await _bind_udp(address, arrived, "0.0.0.0", 0)
+
+
+async def _bind_udp(address: Address, arrived: Arrived, host: str, port: int) -> Wire:
     loop = asyncio.get_running_loop()
-    local = (address.host, address.port) if address.kind == "udpin" else ("0.0.0.0", 0)
-    _, wire = await loop.create_datagram_endpoint(lambda: _UdpWire(address, arrived), local)
+    _, wire = await loop.create_datagram_endpoint(lambda: _UdpWire(address, arrived), (host, port))
     return wire
+
+
+def _own_port(address: Address) -> int:
+    """The port that we speak first from, the same at every start: PX4 answers only whom it heard first."""
+    return OWN_PORTS[zlib.crc32(f"{address.host}:{address.port}".encode()) % len(OWN_PORTS)]
 
 
 class _TcpWire(asyncio.Protocol):

@@ -94,3 +94,18 @@ def test_a_low_battery_is_heeded_while_all_hold(tmp_path: Path) -> None:
     assert "battery at 25 %: returns" in told
     assert float(told.split(" s: battery")[0]) < 330.0
     assert outcomes(outcome) == ["landed"] * 3
+
+
+def test_a_silent_one_that_is_heard_again_when_all_others_are_down_comes_home(tmp_path: Path) -> None:
+    live = Live(tmp_path, {"safety.if_one_fails": "continue"}, autopilots=["ardupilot"] * 3)
+    network = live.fleet.vehicles[1].network
+    live.at = [
+        (95.0, lambda live: network.impair(up_cut=True, down_cut=True)),
+        (260.0, lambda live: network.impair(up_cut=False, down_cut=False)),
+    ]
+    outcome = live.fly()
+    assert "heartbeat again" in events(outcome, 2)
+    assert (outcomes(outcome), all(live.down)) == (["landed"] * 3, True)
+    fleet, track = outcome.world.fleet, outcome.track
+    assert abs(track.field("east")[-1, 1] - fleet["pad_east"][1]) < 1.5
+    assert abs(track.field("north")[-1, 1] - fleet["pad_north"][1]) < 1.5

@@ -7,6 +7,7 @@ run is the same run.  Between controller and stubs are the vehicles' own bad net
 import asyncio
 import math
 import selectors
+import shutil
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -16,6 +17,7 @@ from typing import Any, TypeVar
 from sim_vehicle_stub.faults import parse_order
 from sim_vehicle_stub.fleet import StubFleet
 from swarmctl.core.world import World
+from swarmctl.flight import resumption
 from swarmctl.flight.fly_live import LiveOptions, fly_live
 from swarmctl.flight.orders import Orders
 from swarmctl.flight.results import Outcome
@@ -70,10 +72,17 @@ def run(work: Coroutine[Any, Any, T]) -> T:
 
 
 class StubWires:
-    """The switchboard's place, with stub vehicles at the other end; ``addresses``: where each is heard."""
+    """The switchboard's place, with stub vehicles at the other end; ``addresses``: where each is heard.
 
-    def __init__(self, fleet: StubFleet, addresses: Sequence[Address] | None = None) -> None:
+    ``since_s``: the fleet's time when the controller's began.  ``dead``: the controller was killed.
+    """
+
+    def __init__(
+        self, fleet: StubFleet, addresses: Sequence[Address] | None = None, since_s: float = 0.0
+    ) -> None:
         self.fleet = fleet
+        self.since_s = since_s
+        self.dead = False
         self.each_step: Callable[[float], None] = lambda now: None
         self._addresses = addresses or [ANYWHERE] * len(fleet.vehicles)
         self._heard: set[int] = set()
@@ -104,7 +113,8 @@ class StubWires:
 
     def send(self, system: int, frame: bytes) -> None:
         """To a vehicle."""
-        self.fleet.vehicles[system - 1].receive(frame, asyncio.get_running_loop().time())
+        if not self.dead:
+            self.fleet.vehicles[system - 1].receive(frame, self.since_s + asyncio.get_running_loop().time())
 
     def call(self, frame: bytes) -> None:
         """To all."""
@@ -123,7 +133,7 @@ class StubWires:
             k += 1
             await asyncio.sleep(max(0.0, k * STEP_S - loop.time()))
             self.each_step(loop.time())
-            self.fleet.advance(loop.time())
+            self.fleet.advance(self.since_s + loop.time())
             for vehicle in self.fleet.vehicles:
                 for data in vehicle.outgoing():
                     if any(True for _ in self._decoders[vehicle.system].feed(data)):
@@ -163,6 +173,7 @@ class Live:
     swarm: Swarm | None = None
     orders: Orders = field(default_factory=Orders)
     now: float = 0.0
+    fleet_s: float = 0.0
     nearest_m: float = math.inf  #: how near two vehicles in the air at one height truly came
 
     def __post_init__(self) -> None:
@@ -199,14 +210,45 @@ class Live:
             **{"addresses": [[ANYWHERE]] * len(self.autopilots), "wires": lambda: self.wires, **self.options}
         )
 
-        def report(now: float, swarm: Swarm, world: World) -> None:
-            self.swarm = swarm
-
-        flight = fly_live(mission, 1, self.folder, options, self.orders, report)
+        flight = fly_live(mission, 1, self.folder, options, self.orders, self._report)
         return run(asyncio.wait_for(flight, LONGEST_S))
+
+    def die(self) -> Path:
+        """Kill the controller now, and let what was on disk by then be all that it leaves: in that folder."""
+        left = self.path / "killed"
+        shutil.copytree(self.folder.path, left)
+        self.wires.dead = True
+        asyncio.get_running_loop().stop()
+        return left
+
+    def forsake(self, seconds: float) -> None:
+        """The vehicles fly on, nobody speaks to them."""
+        for _ in range(round(seconds / STEP_S)):
+            self.fleet_s += STEP_S
+            self.fleet.advance(self.fleet_s)
+            for vehicle in self.fleet.vehicles:
+                vehicle.outgoing()
+
+    def resume(self, run_folder: Path, name: str = "resumed", **options: Any) -> Outcome:
+        """Fly on what was killed, into a folder of that name, to its end."""
+        before = resumption.read(run_folder)
+        self.wires = StubWires(self.fleet, since_s=self.fleet_s)
+        self.wires.each_step = self._step
+        self.folder = RunFolder(self.path / name)
+        self.folder.path.mkdir()
+        self.orders = Orders()
+        wanted = LiveOptions(
+            [[address] for address in before.addresses], wires=lambda: self.wires, resumes=before, **options
+        )
+        flight = fly_live(before.mission, before.seed, self.folder, wanted, self.orders, self._report)
+        return run(asyncio.wait_for(flight, LONGEST_S))
+
+    def _report(self, now: float, swarm: Swarm, world: World) -> None:
+        self.swarm = swarm
 
     def _step(self, now: float) -> None:
         self.now = now
+        self.fleet_s = self.wires.since_s + now
         self._measure()
         while self.at and self.at[0][0] <= now:
             self.at.pop(0)[1](self)

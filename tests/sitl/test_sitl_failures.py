@@ -146,7 +146,7 @@ def test_a_pilot_takes_a_vehicle_and_gives_it_back(stage: Stage, firmware: str) 
     scene.told(f"vehicle {pilot.system}: its mode became")
     scene.pass_by(10.0)
     assert pilot.is_in("hold")  # nobody fights for it
-    assert "done" in scene.control("retake", str(pilot.system)) or pilot.is_in("setpoints")
+    assert f"retake vehicle {pilot.system} at" in scene.control("retake", str(pilot.system))
     pilot.until(lambda: pilot.is_in("setpoints"), 20.0)
     code, summary = scene.flight.ended()
     assert (code, outcomes(summary)) == (0, ["landed"] * 2)
@@ -173,8 +173,8 @@ def test_a_fence_on_board_that_is_broken(stage: Stage, firmware: str, action: st
     pilot.fence_in(place(1), 20.0)
     scene.told(f"vehicle {pilot.system}: its mode became")
     scene.pass_by(10.0)
-    assert pilot.is_in(action) and not pilot.is_in("setpoints")  # not silently taken back
-    if action == "hold":
+    assert pilot.is_in("hold") or pilot.is_in("return")  # and not silently taken back
+    if pilot.is_in("hold"):
         pilot.change_mode("land")
     code, summary = scene.flight.ended()
     assert (code, outcomes(summary)) == (1, ["landed", "released"])
@@ -210,3 +210,14 @@ def test_vehicles_come_home_from_a_controller_that_died(stage: Stage, firmware: 
         f"{firmware}: return {noticed[0]:.1f} s after the controller's end, on the ground {down[0]:.1f} s later"
     )
     assert all(abs(pilot.height_m) < 2.0 for pilot in scene.pilots)
+
+
+def test_a_controller_that_died_is_resumed(stage: Stage, fly: Fly, firmware: str) -> None:
+    """PX4 is on its way home by then, ArduCopter hovers; both are taken back and search on."""
+    scene = stage("--duration", 60)
+    scene.flight.kill()
+    scene.pass_by(6.0)
+    assert all(pilot.is_in("return" if firmware == "px4" else "setpoints") for pilot in scene.pilots)
+    code, summary = fly("--resume", scene.flight.run, mission=None).ended()
+    assert (code, outcomes(summary)) == (0, ["landed"] * 2)
+    assert summary["searched_s"] == 60.0 and summary["geofence_violations"] == 0

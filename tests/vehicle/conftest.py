@@ -21,10 +21,13 @@ class Rig:
     """A session and its vehicle in virtual time; ``up`` and ``down`` may spoil what crosses the link."""
 
     def __init__(
-        self, vehicle: type[FakePx4] = FakePx4, preflight: Preflight | None = None, **settings: float
-    ) -> None:
+        self, vehicle: type[FakePx4] = FakePx4, preflight: Preflight | None = None, adopts: bool = False,
+        **settings: float,
+    ) -> None:  # fmt: skip
         self.now = 0.0
-        self.session = Session(1, settings=SessionSettings(**settings), now=0.0, preflight=preflight)
+        self.session = Session(
+            1, settings=SessionSettings(**settings), now=0.0, preflight=preflight, adopts=adopts
+        )
         self.vehicle = vehicle(1)
         self.up: Callable[[list[bytes]], list[bytes]] = lambda frames: frames
         self.down: Callable[[list[bytes]], list[bytes]] = lambda frames: frames
@@ -60,7 +63,7 @@ class Rig:
         """Bring the session to ``phase`` as a flight would."""
         if phase is Phase.CONNECTING:
             return
-        if phase in BEFORE_READY:
+        if phase in BEFORE_READY or phase is Phase.FOUND:
             self.until_phase(phase)
             return
         if phase in ON_THE_WAY_OUT:

@@ -14,6 +14,8 @@ from swarmctl.vehicle.phases import AIRBORNE, SET_UP, TABLE, Phase, Signal
 from swarmctl.vehicle.preflight import Preflight
 from swarmctl.vehicle.session import OrderError
 
+FAILED = (Signal.STEP_FAILED, Signal.FAILED_IN_FLIGHT)
+IN_FLIGHT = (Signal.CHECKED_IN_FLIGHT, Signal.FAILED_IN_FLIGHT)
 DENIED = [mav.MAV_RESULT_DENIED]
 POSCTL = 3 << 16
 PREFLIGHT = Preflight(fence=Fence([[(47.39, 8.54), (47.39, 8.55), (47.40, 8.55)]]))
@@ -21,6 +23,12 @@ PREFLIGHT = Preflight(fence=Fence([[(47.39, 8.54), (47.39, 8.55), (47.40, 8.55)]
 
 def hear(rig: Any) -> None:
     rig.run(1.2)
+
+
+def take_up(rig: Any) -> None:
+    """Another controller has taken the vehicle off, and died."""
+    rig.vehicle.armed, rig.vehicle.mode = True, MODES.comeback
+    rig.vehicle.height_m = rig.vehicle.target_m = 20.0
 
 
 def finish(rig: Any) -> None:
@@ -32,7 +40,7 @@ def break_off(rig: Any) -> None:
     """Make the next command fail for good."""
     before = rig.session.phase
     if rig.session.phase is Phase.POSITIONING:
-        rig.vehicle.healthy = False
+        rig.vehicle.healthy = rig.vehicle.home_known = False
     rig.vehicle.memory.result = mav.MAV_MISSION_DENIED
     for number in (mav.MAV_CMD_SET_MESSAGE_INTERVAL, mav.MAV_CMD_DO_SET_MODE, mav.MAV_CMD_NAV_TAKEOFF):
         rig.vehicle.results[number] = [DENIED] * 200
@@ -97,8 +105,13 @@ CAUSES: dict[Signal, Callable[[Any], None]] = {
     Signal.HEARTBEAT: hear,
     Signal.STEPS_DONE: finish,
     Signal.STEP_FAILED: break_off,
+    Signal.CHECKED_IN_FLIGHT: finish,
+    Signal.CHECKED_LANDED: finish,
+    Signal.FAILED_IN_FLIGHT: break_off,
     Signal.CHECK: lambda rig: rig.session.check(Preflight(read_parameters=True)),
     Signal.TAKE_OFF: lambda rig: rig.session.take_off(20.0),
+    Signal.ADOPT: lambda rig: rig.session.adopt(),
+    Signal.DECLINE: lambda rig: rig.session.decline("it is outside the fence"),
     Signal.ENGAGE: lambda rig: rig.session.engage(),
     Signal.HOLD: lambda rig: rig.session.hold(),
     Signal.LAND: lambda rig: rig.session.land(),
@@ -122,7 +135,9 @@ def entered(rig: Any) -> list[str]:
 
 def prepare(rig: Any, phase: Phase, signal: Signal) -> None:
     """Bring the session to ``phase``, by a way on which ``signal`` can come next."""
-    if signal is Signal.STEP_FAILED and phase is Phase.IDENTIFYING:
+    if signal in IN_FLIGHT or phase is Phase.FOUND:
+        take_up(rig)
+    if signal in FAILED and phase is Phase.IDENTIFYING:
         rig.vehicle.autopilot = mav.MAV_AUTOPILOT_SMACCMPILOT
     elif phase is Phase.FAILED:
         rig.reach(Phase.HOLDING)
@@ -151,11 +166,12 @@ def prepare(rig: Any, phase: Phase, signal: Signal) -> None:
 
 @pytest.mark.parametrize(("phase", "signal"), TABLE, ids=lambda value: value.name)
 def test_row(make_rig: Any, phase: Phase, signal: Signal) -> None:
-    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None)
+    adopts = phase is Phase.FOUND or signal in (*IN_FLIGHT, Signal.CHECKED_LANDED)
+    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None, adopts=adopts)
     prepare(rig, phase, signal)
     rig.events += rig.session.events()
     seen = len(entered(rig))
-    if (phase, signal) == (Phase.IDENTIFYING, Signal.STEP_FAILED):
+    if phase is Phase.IDENTIFYING and signal in FAILED:
         hear(rig)
         seen = 1
     else:
@@ -173,12 +189,17 @@ def test_every_phase_can_be_entered_and_every_action_is_used() -> None:
 
 @pytest.mark.parametrize("phase", [*SET_UP, Phase.CONNECTING, Phase.HOLDING, Phase.ENGAGED, Phase.LANDED])
 def test_an_order_out_of_place_is_refused_and_changes_nothing(make_rig: Any, phase: Phase) -> None:
-    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None)
+    found = phase is Phase.FOUND
+    rig = make_rig(preflight=PREFLIGHT if phase is Phase.CHECKING else None, adopts=found)
+    if found:
+        take_up(rig)
     rig.reach(Phase.LANDING if phase is Phase.LANDED else phase)
     rig.until_phase(phase)
     orders = {
         Signal.CHECK: lambda: rig.session.check(PREFLIGHT),
         Signal.TAKE_OFF: lambda: rig.session.take_off(20.0),
+        Signal.ADOPT: rig.session.adopt,
+        Signal.DECLINE: lambda: rig.session.decline("it is outside the fence"),
         Signal.ENGAGE: rig.session.engage,
         Signal.HOLD: rig.session.hold,
         Signal.LAND: rig.session.land,

@@ -4,6 +4,7 @@ import asyncio
 import os
 import pty
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
 
@@ -128,3 +129,49 @@ def test_no_such_device_is_named() -> None:
             await Switchboard().open([Address("serial", "/dev/no-such", 57600)])
 
     run(scene)
+
+
+def test_who_speaks_first_does_so_from_the_same_port_at_every_start() -> None:
+    """PX4 answers only whom it heard first, also when another controller has taken that one's place."""
+
+    async def scene() -> None:
+        loop = asyncio.get_running_loop()
+        vehicle = _Locked()
+        transport, _ = await loop.create_datagram_endpoint(lambda: vehicle, ("127.0.0.1", 0))
+        place = Address("udpout", "127.0.0.1", transport.get_extra_info("sockname")[1])
+        first = await _greets(place)
+        await until(lambda: first.heard == [7])
+        first.close()
+        await asyncio.sleep(0)
+        again = await _greets(place)
+        await until(lambda: again.heard == [7])
+        assert len(vehicle.heard_from) == 1
+        other = await _greets(place)  # the port is taken: another will do
+        await until(lambda: len(vehicle.heard_from) == 2)
+        for open_one in (again, other, transport):
+            open_one.close()
+
+    run(scene)
+
+
+async def _greets(place: Address) -> Switchboard:
+    """A controller that speaks first."""
+    switchboard = Switchboard()
+    await switchboard.open([place])
+    switchboard.call(beat(255, mav.MAV_TYPE_GCS, 190))
+    return switchboard
+
+
+class _Locked(asyncio.DatagramProtocol):
+    """A vehicle that answers only whom it heard first."""
+
+    def __init__(self) -> None:
+        self.heard_from: list[tuple[str, int]] = []
+
+    def connection_made(self, transport: Any) -> None:
+        self._transport = transport
+
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        if addr not in self.heard_from:
+            self.heard_from.append(addr)
+        self._transport.sendto(beat(7), self.heard_from[0])

@@ -24,6 +24,7 @@ class Modes:
 
     ``take_off`` is what the vehicle shows while it climbs, ``engaged`` while it flies our setpoints,
     ``comeback`` is the firmware's own return, ``parked`` is left behind after landing: arming is harmless.
+    ``failsafes`` are others that a failsafe may choose.
     """
 
     take_off: int
@@ -33,6 +34,12 @@ class Modes:
     comeback: int
     parked: int
     names: Mapping[int, str]
+    failsafes: tuple[int, ...] = ()
+
+    @property
+    def unattended(self) -> frozenset[int]:
+        """In which nobody has a hand on the stick: ours, and those that a failsafe chooses."""
+        return frozenset((self.take_off, self.hold, self.engaged, self.land, self.comeback, *self.failsafes))
 
     def name(self, mode: int) -> str:
         """The mode's name, or its number."""

@@ -29,7 +29,7 @@ from swarmctl.vehicle.telemetry import Telemetry
 
 from .adapter import Limits, Modes
 
-GUIDED = 4
+GUIDED, SMART_RTL = 4, 21
 # LOITER without a radio control sinks: BRAKE holds.  In LAND it cannot be armed.
 MODES = Modes(
     take_off=GUIDED,
@@ -52,8 +52,9 @@ MODES = Modes(
         17: "BRAKE",
         18: "THROW",
         20: "GUIDED_NOGPS",
-        21: "SMART_RTL",
+        SMART_RTL: "SMART_RTL",
     },
+    failsafes=(SMART_RTL,),
 )
 
 LIMITS = Limits(braking_mps2=2.0, latency_s=0.3)  # it stops from 8 m/s within 16 m

@@ -1,0 +1,67 @@
+"""What PX4 was seen to do beside what it is asked for: see docs/autopilots.md."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from swarmctl.core.geodesy import to_geodetic
+from swarmctl.mavlink.dialect import mav
+
+from .conftest import ORIGIN
+
+Make = Callable[..., Any]
+OFFBOARD, LOITER, RTL, LAND = 0x60000, 0x3040000, 0x5040000, 0x6040000
+INVALID = "Geofence invalid, doesn't contain Home position\t"
+
+
+def put_fence(s: Any, west: float, east: float) -> int:
+    """A box on board, 100 m north to south; the result that it is acknowledged with."""
+    corners = [to_geodetic(e, n, *ORIGIN) for e, n in ((west, -50), (east, -50), (east, 50), (west, 50))]
+    s.send(mav.MAVLink_mission_count_message(1, 1, 4, mav.MAV_MISSION_TYPE_FENCE))
+    for number, (lat, lon) in enumerate(corners):
+        s.send(
+            mav.MAVLink_mission_item_int_message(
+                1, 1, number, 0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, 0, 0, 4, 0, 0, 0,
+                round(lat * 1e7), round(lon * 1e7), 0, mav.MAV_MISSION_TYPE_FENCE,
+            )
+        )  # fmt: skip
+    return int(s.last(47).type)
+
+
+@pytest.mark.parametrize("holds_home", [True, False])
+def test_a_fence_without_home_is_accepted_and_not_heeded(station: Make, holds_home: bool) -> None:
+    s = station()
+    s.fly_offboard(10.0)
+    assert put_fence(s, -20.0 if holds_home else 5.0, 20.0) == mav.MAV_MISSION_ACCEPTED
+    assert (INVALID in s.texts()) != holds_home
+    s.run(12.0, lambda: s.setpoint(v_east=5.0, z=-10.0))
+    assert s.body["east"] > 20.0
+    assert (s.mode == LOITER) == holds_home
+    assert ("Geofence violated\t" in s.texts()) == holds_home
+
+
+@pytest.mark.parametrize("mode", [RTL, LAND])
+def test_it_sends_itself_commands_for_a_gimbal(station: Make, mode: int) -> None:
+    """COMMAND_LONGs that nobody else is meant by, with the vehicle's own system id as target."""
+    s = station()
+    s.fly_up(10.0)
+    assert not s.all(76)
+    s.set_mode(mode)
+    sent = [fields for _, fields in s.all(76)]
+    assert [(f.command, f.target_system, f.target_component) for f in sent] == [(1001, 1, 0), (1000, 1, 0)]
+    assert math.isnan(sent[1].param1)
+
+
+def test_on_the_ground_one_that_misses_setpoints_says_that_it_is_not_set_up(station: Make) -> None:
+    s = station()
+    s.fly_offboard(10.0)
+    s.set_mode(LAND)
+    s.run_until(lambda: not s.vehicle.armed, 60.0)
+    s.run(2.0)
+    beat = s.last(0)
+    assert (beat.custom_mode, beat.system_status) == (OFFBOARD, mav.MAV_STATE_UNINIT)
+    s.set_mode(LOITER)
+    s.run(2.0)
+    assert s.last(0).system_status == mav.MAV_STATE_STANDBY
