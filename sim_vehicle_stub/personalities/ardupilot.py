@@ -333,6 +333,8 @@ class ArduPilot:
             return f"{self.mode.name} mode not armable"
         if row.needs_position and not vehicle.located:
             return "Need Position Estimate"
+        if self._failsafes.misses_fence:
+            return "Fences enabled, but none selected"
         return "Vehicle breaching fence" if self._failsafes.outside_fence else None
 
     def fail_into(self, mode: Mode) -> None:

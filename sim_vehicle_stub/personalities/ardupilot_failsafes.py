@@ -45,6 +45,12 @@ class Failsafes:
             or (types & CEILING and home and vehicle.wire[2] * 1e-3 - home[2] > values["FENCE_ALT_MAX"])
         )
 
+    @property
+    def misses_fence(self) -> bool:
+        """Whether a fence is switched on that there is nothing of."""
+        values = self._values
+        return bool(values["FENCE_ENABLE"] and values["FENCE_TYPE"] == SHAPES and self._vehicle.fence is None)
+
     def watch(self) -> None:
         """Notice what has begun since the last tick."""
         if self._vehicle.landed:

@@ -104,7 +104,7 @@ class Failsafes:
         was, self._outside = self._outside, self._breaks_fence()
         if was or not self._outside or self._fence_action == 0:
             return
-        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence violated")
+        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence: approaching or outside geofence")
         if self._fence_action != WARN:
             self._loiter_then(FENCE_ACTIONS.get(self._fence_action, Mode.LOITER))
 

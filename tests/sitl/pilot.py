@@ -7,7 +7,7 @@ import math
 import select
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
@@ -16,6 +16,7 @@ SYSTEM, COMPONENT = 250, mav.MAV_COMP_ID_MISSIONPLANNER
 GREET_S, LOOK_S = 1.0, 0.2
 WANTED = (mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
 WANTED_US = 200_000
+NEEDED = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
 FENCE: int = mav.MAV_MISSION_TYPE_FENCE
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
 M_PER_DEG = 111_194.9
@@ -80,6 +81,17 @@ class Pilot:
         given = (*parameters, *[0.0] * 7)[:7]
         self.say(mav.MAVLink_command_long_message(self.system, 1, number, 0, *given))
 
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """As numbers, which is ArduPilot's way; see that each is done."""
+        for name, value in values.items():
+            self.last.pop("PARAM_VALUE", None)
+            self.say(mav.MAVLink_param_set_message(self.system, 1, name.encode(), value, 9))
+            self.until(lambda name=name: self._told_of(name), 10.0)
+            assert self.last["PARAM_VALUE"].param_value == value
+
+    def _told_of(self, parameter: str) -> bool:
+        return "PARAM_VALUE" in self.last and self.last["PARAM_VALUE"].param_id == parameter
+
     def say(self, message: Any) -> None:
         """Send a message, if it is known where to."""
         if self._peer is not None:
@@ -109,8 +121,9 @@ class Pilot:
         """With a heartbeat of now: what has waited to be read is of before."""
         while select.select([self._socket], [], [], 0.0)[0]:
             self._take()
-        self.last.pop("HEARTBEAT", None)
-        self.until(lambda: "HEARTBEAT" in self.last, 10.0)
+        for kind in NEEDED:
+            self.last.pop(kind, None)
+        self.until(lambda: set(self.last) >= NEEDED, 10.0)
         return self
 
     def fence_in(self, home: tuple[float, float], margin_m: float) -> None:
