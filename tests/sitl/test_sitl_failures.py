@@ -114,7 +114,7 @@ def test_a_controller_that_stands_still(stage: Stage, firmware: str, silent_s: f
     """Who waited flies on; who was brought home by its failsafe for long is not taken back."""
     scene = stage("--duration", 60)
     os.kill(scene.flight.process.pid, signal.SIGSTOP)
-    scene.pass_by(silent_s)
+    scene.pilots[0].pass_by(silent_s / scene.speed)
     os.kill(scene.flight.process.pid, signal.SIGCONT)
     code, summary = scene.flight.ended()
     returned = firmware == "px4" and silent_s > 3.0
