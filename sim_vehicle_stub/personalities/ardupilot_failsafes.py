@@ -70,8 +70,10 @@ class Failsafes:
 
     def _watch_fence(self) -> None:
         was, self._outside = self._outside, self.outside_fence
+        if was and not self._outside:
+            self._vehicle.say(mav.MAV_SEVERITY_NOTICE, "Fence breach cleared")
         if self._outside and not was:
-            self._say("Fence Breached")
+            self._vehicle.say(mav.MAV_SEVERITY_NOTICE, "Polygon fence breached")
             action = FENCE_ACTIONS.get(int(self._values["FENCE_ACTION"]))
             if action is not None:
                 self._autopilot.fail_into(action)

@@ -20,6 +20,8 @@ NEEDED = {"HEARTBEAT", "GLOBAL_POSITION_INT"}
 FENCE: int = mav.MAV_MISSION_TYPE_FENCE
 REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
 M_PER_DEG = 111_194.9
+FORGETS_S = 3.0
+"""A fence that was cleared is still asked for a moment."""
 MODES: dict[str, dict[str, tuple[int, int]]] = {  # DO_SET_MODE's second and third parameter
     "px4": {"hold": (4, 3), "return": (4, 5), "land": (4, 6)},
     "ardupilot": {"hold": (17, 0), "return": (6, 0), "land": (9, 0)},
@@ -159,8 +161,11 @@ class Pilot:
         )  # fmt: skip
 
     def fly_to(self, lat: float, lon: float, patience_s: float) -> None:
-        """Without a fence on board, fly somewhere at the present altitude, and be there."""
+        """Without a fence on board, which PX4 would refuse to leave, fly somewhere at this altitude, and be there."""
+        self.last.pop("MISSION_ACK", None)
         self.say(mav.MAVLink_mission_clear_all_message(self.system, 1, FENCE))
+        self.until(lambda: "MISSION_ACK" in self.last, 10.0)
+        self.pass_by(FORGETS_S)
         alt_m = self.last["GLOBAL_POSITION_INT"].alt * 1e-3
         self.say(
             mav.MAVLink_command_int_message(

@@ -6,10 +6,7 @@ from typing import Any
 
 import pytest
 
-from swarmctl.core.geodesy import to_geodetic
 from swarmctl.mavlink.dialect import mav
-
-from .conftest import ORIGIN
 
 Make = Callable[..., Any]
 OFFBOARD, LOITER, RTL, LAND = 0x60000, 0x3040000, 0x5040000, 0x6040000
@@ -17,25 +14,11 @@ BREACHED = "Geofence: approaching or outside geofence\t"
 INVALID = "Geofence invalid, doesn't contain Home position\t"
 
 
-def put_fence(s: Any, west: float, east: float) -> int:
-    """A box on board, 100 m north to south; the result that it is acknowledged with."""
-    corners = [to_geodetic(e, n, *ORIGIN) for e, n in ((west, -50), (east, -50), (east, 50), (west, 50))]
-    s.send(mav.MAVLink_mission_count_message(1, 1, 4, mav.MAV_MISSION_TYPE_FENCE))
-    for number, (lat, lon) in enumerate(corners):
-        s.send(
-            mav.MAVLink_mission_item_int_message(
-                1, 1, number, 0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, 0, 0, 4, 0, 0, 0,
-                round(lat * 1e7), round(lon * 1e7), 0, mav.MAV_MISSION_TYPE_FENCE,
-            )
-        )  # fmt: skip
-    return int(s.last(47).type)
-
-
 @pytest.mark.parametrize("holds_home", [True, False])
 def test_a_fence_without_home_is_accepted_and_not_heeded(station: Make, holds_home: bool) -> None:
     s = station()
     s.fly_offboard(10.0)
-    assert put_fence(s, -20.0 if holds_home else 5.0, 20.0) == mav.MAV_MISSION_ACCEPTED
+    assert s.put_fence(-20.0 if holds_home else 5.0, 20.0) == mav.MAV_MISSION_ACCEPTED
     assert (INVALID in s.texts()) != holds_home
     s.run(12.0, lambda: s.setpoint(v_east=5.0, z=-10.0))
     assert s.body["east"] > 20.0
