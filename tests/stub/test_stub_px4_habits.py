@@ -49,3 +49,15 @@ def test_on_the_ground_one_that_misses_setpoints_says_that_it_is_not_set_up(stat
     s.set_mode(LOITER)
     s.run(2.0)
     assert s.last(0).system_status == mav.MAV_STATE_STANDBY
+
+
+@pytest.mark.parametrize(("speed", "then"), [(3.0, LOITER), (8.0, RTL)])
+def test_who_breaks_its_fence_fast_holds_and_then_returns(station: Make, speed: float, then: int) -> None:
+    """With GF_ACTION 2; slowly, it holds for good."""
+    s = station()
+    s.fly_offboard(10.0)
+    s.put_fence(-20.0, 60.0)
+    s.set_parameter("GF_ACTION", 2)
+    s.run_until(lambda: s.mode == LOITER, 60.0, lambda: s.setpoint(v_east=speed, z=-10.0))
+    s.run(5.0)
+    assert s.mode == then
