@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from swarmctl.core import stages
-from swarmctl.flight.live import LiveLink
 from swarmctl.flight.roster import AIRBORNE, Roster
+from swarmctl.flight.swarm import Swarm
 
 from .virtual import Live, events, outcomes
 
@@ -75,18 +75,31 @@ def test_setpoints_of_before_the_standstill_are_not_sent(
 ) -> None:
     """The process may be stopped between a tick and its sending."""
     live = Live(tmp_path, SLOW)
-    flush = LiveLink.flush
+    tick = Swarm.tick
     stopped: list[float] = []
 
-    def stopped_before(link: LiveLink, now: float) -> None:
-        if now > 70.0 and not stopped and live.swarm is not None and live.swarm.search_began:
+    def stopped_after(swarm: Swarm, k: int, now: float) -> None:
+        tick(swarm, k, now)
+        if now > 70.0 and not stopped:
             stopped.append(now)
-            live.wires.stop_controller(10.0)
-        flush(link, now)
+            live.wires.stop_controller(10.0, kept=0)
 
     seen: list[set[int]] = []
-    monkeypatch.setattr(LiveLink, "flush", stopped_before)
+    monkeypatch.setattr(Swarm, "tick", stopped_after)
     live.at = [(82.0, lambda live: seen.append(modes(live)))]
     outcome = live.fly()
     assert stopped and seen == [{0x5040000}]
     assert outcomes(outcome) == ["released"] * 3
+
+
+def test_all_that_were_silent_at_once_come_home(tmp_path: Path) -> None:
+    """For a moment nobody was the swarm's, and there was nobody to wait for."""
+    faults = [f"{system}:link-loss@70+5" for system in (1, 2, 3)]
+    live = Live(tmp_path, SLOW, ["ardupilot"] * 3, faults=faults)
+    outcome = live.fly()
+    assert (outcomes(outcome), all(live.down)) == (["landed"] * 3, True)
+    assert live.now < 300.0
+    fleet = outcome.world.fleet
+    for row, body in enumerate(live.fleet.truth):
+        assert abs(body["east"] - fleet["pad_east"][row]) < 1.5
+        assert abs(body["north"] - fleet["pad_north"][row]) < 1.5
