@@ -8,7 +8,7 @@ import pytest
 
 from swarmctl.core import stages
 from swarmctl.flight.roster import AIRBORNE, Roster
-from swarmctl.flight.swarm import Swarm
+from swarmctl.flight.swarm import Part, Swarm
 
 from .virtual import Live, events, outcomes
 
@@ -96,7 +96,10 @@ def test_all_that_were_silent_at_once_come_home(tmp_path: Path) -> None:
     """For a moment nobody was the swarm's, and there was nobody to wait for."""
     faults = [f"{system}:link-loss@70+5" for system in (1, 2, 3)]
     live = Live(tmp_path, SLOW, ["ardupilot"] * 3, faults=faults)
+    parts: list[Part] = []
+    live.at = [(82.0, lambda live: parts.append(live.swarm.part if live.swarm else Part.OVER))]
     outcome = live.fly()
+    assert parts == [Part.RETURNING]  # and looked after as such
     assert (outcomes(outcome), all(live.down)) == (["landed"] * 3, True)
     assert live.now < 300.0
     fleet = outcome.world.fleet
