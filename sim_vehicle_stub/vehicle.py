@@ -349,6 +349,7 @@ class StubVehicle:
     def build_fence(self, items: list[Item]) -> None:
         """Hold the fence that these items describe, or none."""
         self.fence = fence_of(items, self.fleet_origin) if items else None
+        self.personality.fence_changed()
 
     def lose_fix(self) -> None:
         """No satellite is seen any more."""

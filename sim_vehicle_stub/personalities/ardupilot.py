@@ -334,6 +334,8 @@ class ArduPilot:
             return f"{self.mode.name} mode not armable"
         if row.needs_position and not vehicle.located:
             return "Need Position Estimate"
+        if self._failsafes.misses_fence:
+            return "Fences enabled, but none selected"
         return "Vehicle breaching fence" if self._failsafes.outside_fence else None
 
     def fail_into(self, mode: Mode) -> None:
@@ -348,6 +350,9 @@ class ArduPilot:
         self._pilot.limit("speed", self.values["WP_SPD"])
         self._pilot.limit("acceleration", self.values["WP_ACC"])
         self._pace()
+
+    def fence_changed(self) -> None:
+        """It will do."""
 
     def disarmed(self) -> None:
         """The mode stays; a failsafe is over."""

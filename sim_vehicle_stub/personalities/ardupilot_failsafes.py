@@ -45,6 +45,12 @@ class Failsafes:
             or (types & CEILING and home and vehicle.wire[2] * 1e-3 - home[2] > values["FENCE_ALT_MAX"])
         )
 
+    @property
+    def misses_fence(self) -> bool:
+        """Whether a fence is switched on that there is nothing of."""
+        values = self._values
+        return bool(values["FENCE_ENABLE"] and values["FENCE_TYPE"] == SHAPES and self._vehicle.fence is None)
+
     def watch(self) -> None:
         """Notice what has begun since the last tick."""
         if self._vehicle.landed:
@@ -64,8 +70,10 @@ class Failsafes:
 
     def _watch_fence(self) -> None:
         was, self._outside = self._outside, self.outside_fence
+        if was and not self._outside:
+            self._vehicle.say(mav.MAV_SEVERITY_NOTICE, "Fence breach cleared")
         if self._outside and not was:
-            self._say("Fence Breached")
+            self._vehicle.say(mav.MAV_SEVERITY_NOTICE, "Polygon fence breached")
             action = FENCE_ACTIONS.get(int(self._values["FENCE_ACTION"]))
             if action is not None:
                 self._autopilot.fail_into(action)

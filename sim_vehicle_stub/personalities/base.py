@@ -106,5 +106,8 @@ class Personality(Protocol):
     def parameter_changed(self, name: str) -> None:
         """A parameter has a new value."""
 
+    def fence_changed(self) -> None:
+        """Another fence is on board, or none."""
+
     def disarmed(self) -> None:
         """The vehicle has just been disarmed."""

@@ -5,6 +5,7 @@ firmware remembers beside the mode it is in (which a failsafe may have chosen) t
 the ground.  Commands are in px4_commands.py, setpoints and what they mean in px4_setpoints.py.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
@@ -28,6 +29,11 @@ READY_AFTER_S = 4.5
 BOUND_LIMITS = {"MPC_XY_VEL_MAX": ("speed",), "MPC_ACC_HOR": ("acceleration", "braking", "approach")}
 """The limits of the body that a parameter sets."""
 SPOOL_UP_S = 3.0
+GIMBAL_COMMANDS: dict[int, tuple[float, ...]] = {
+    mav.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: (-3.0, -3.0, -1.0, -1.0, 0.0, 0.0, 0.0),
+    mav.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: (math.nan, math.nan, math.nan, math.nan, 2.0, 0.0, 0.0),
+}
+"""What it sends itself when it begins to return or to land."""
 AUTO_BASE_MODE: int = (
     mav.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     | mav.MAV_MODE_FLAG_AUTO_ENABLED
@@ -105,10 +111,13 @@ class Px4:
 
     @property
     def system_status(self) -> int:
-        """Critical in a failsafe, else active while armed."""
+        """Critical in a failsafe, else active while armed; on the ground one that misses setpoints is not set up."""
         if self._failsafe:
             return int(mav.MAV_STATE_CRITICAL)
-        return int(mav.MAV_STATE_ACTIVE if self.vehicle.armed else mav.MAV_STATE_STANDBY)
+        if self.vehicle.armed:
+            return int(mav.MAV_STATE_ACTIVE)
+        waits = self.mode is Mode.OFFBOARD and self._setpoints.lost
+        return int(mav.MAV_STATE_UNINIT if waits else mav.MAV_STATE_STANDBY)
 
     @property
     def landed_state(self) -> int:
@@ -220,6 +229,7 @@ class Px4:
             self._pilot.height(self.takeoff_height)
 
     def _begin_land(self) -> None:
+        self._center_gimbal()
         if self.vehicle.located:
             self._pilot.hold()
         else:
@@ -227,7 +237,14 @@ class Px4:
         self._pilot.descend()
 
     def _begin_rtl(self) -> None:
+        self._center_gimbal()
         self._return.begin()
+
+    def _center_gimbal(self) -> None:
+        """Commands to itself, for a gimbal, that everybody on the link hears."""
+        system = self.vehicle.system
+        for number, parameters in GIMBAL_COMMANDS.items():
+            self.vehicle.send_message(mav.MAVLink_command_long_message(system, 0, number, 0, *parameters))
 
     def _step_rtl(self) -> None:
         self._return.step()
@@ -237,7 +254,7 @@ class Px4:
 
     def _step_offboard(self) -> None:
         if self._setpoints.missed:
-            self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Failsafe activated: no offboard signal, RTL")
+            self.vehicle.say(mav.MAV_SEVERITY_CRITICAL, "Failsafe activated")
             self.fail_into(Mode.RTL)
             self._resumes = True
 
@@ -315,6 +332,10 @@ class Px4:
             self._pilot.limit(limit, self._parameters[name])
         self._failsafes.parameter_changed()
         self._pace()
+
+    def fence_changed(self) -> None:
+        """It may not do."""
+        self._failsafes.fence_changed()
 
     def disarmed(self) -> None:
         """Back to the mode before landing, which may be OFFBOARD."""

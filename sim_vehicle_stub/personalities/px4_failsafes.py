@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 GCS_NOTICED_S = 1.8
 """What passes, beside the parameter, until a silent ground station has consequences."""
 WARN = 1
+FAST_BREACH_CMPS, FAST_BREACH_S = 600, 2.2
+"""Who is so fast is still on its way out when the breach is noticed anew, so long after; then holding is not enough."""
 FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}
 GCS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}
 BATTERY_LEVELS = (
@@ -86,17 +88,31 @@ class Failsafes:
         if vehicle.located is self._unlocated:
             self._watch_position()
 
+    def fence_changed(self) -> None:
+        """A fence that home is not inside of is taken and told as any other, but complained of and not heeded."""
+        if not self._is_fence_valid():
+            text = "Geofence invalid, doesn't contain Home position"
+            self._vehicle.say(mav.MAV_SEVERITY_CRITICAL, text)
+
+    def _is_fence_valid(self) -> bool:
+        fence, home = self._vehicle.fence, self._vehicle.home
+        return fence is None or home is None or not fence.broken_at(*self._vehicle.home_place)
+
     def _breaks_fence(self) -> bool:
-        east, north = self._vehicle.pilot.place[:2]
-        return self._vehicle.fence is not None and self._vehicle.fence.broken_at(east, north)
+        fence, place = self._vehicle.fence, self._vehicle.pilot.place[:2]
+        return fence is not None and fence.broken_at(*place) and self._is_fence_valid()
 
     def _watch_fence(self) -> None:
         was, self._outside = self._outside, self._breaks_fence()
         if was or not self._outside or self._fence_action == 0:
             return
-        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence violated")
-        if self._fence_action != WARN:
-            self._loiter_then(FENCE_ACTIONS.get(self._fence_action, Mode.LOITER))
+        self._vehicle.say(mav.MAV_SEVERITY_WARNING, "Geofence: approaching or outside geofence")
+        if self._fence_action == WARN:
+            return
+        mode = FENCE_ACTIONS.get(self._fence_action, Mode.LOITER)
+        self._loiter_then(mode)
+        if mode is Mode.LOITER and math.hypot(*self._vehicle.wire[4:6]) >= FAST_BREACH_CMPS:
+            self._then, self._then_at = Mode.RTL, self._vehicle.now + FAST_BREACH_S
 
     def _watch_ground_station(self) -> None:
         was, self._gcs_lost = self._gcs_lost, self.misses_ground_station

@@ -187,7 +187,10 @@ async def _fly_prepared(
     swarm = Swarm(mission, world, sessions, journal, start)
     track = Track(len(sessions))
     control = ControlServer(folder.path, lambda words: obey(words, swarm, link.clock.now()))
-    flight = LiveLoop(link, swarm, lambda: world.poses, journal, track, 1.0 / mission.setpoints.rate_hz)
+    flight = LiveLoop(
+        link, swarm, lambda: world.poses, journal, track, 1.0 / mission.setpoints.rate_hz,
+        mission.safety.link_loss_s,
+    )  # fmt: skip
     with closing(journal), closing(control):
         link.record(journal)
         await control.start()

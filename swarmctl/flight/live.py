@@ -30,6 +30,7 @@ from .journal import Journal
 from .preparation import Preparation
 from .swarm import Part, Swarm
 from .track import Track
+from .waking import STOOD_STILL_S, Waking
 
 CALLING_LINK = 0
 """The link id that calls are signed with; each vehicle's own stream has its system id."""
@@ -217,6 +218,11 @@ class LiveLink:
         for session in self.sessions:
             self._record(session, now)
 
+    def discard(self) -> None:
+        """Send nothing of what the sessions have queued."""
+        for session in self.sessions:
+            session.outgoing()
+
     def close(self) -> None:
         """Close every wire."""
         self.wires.close()
@@ -246,8 +252,10 @@ class LiveLoop:
 
     def __init__(
         self, link: LiveLink, swarm: Swarm, poses: Callable[[], Records], journal: Journal, track: Track,
-        interval_s: float,
+        interval_s: float, link_loss_s: float,
     ) -> None:  # fmt: skip
+        self._link_loss_s = link_loss_s
+        self._ticked_at = link.clock.now()
         self._link, self._swarm, self._journal, self._track = link, swarm, journal, track
         self._poses = poses
         self._interval_s = interval_s
@@ -271,7 +279,9 @@ class LiveLoop:
         wall_interval = self._interval_s / self._link.clock.speed
         deadline = loop.time()
         k = 0
+        self._ticked_at = self._link.clock.now()
         while self._swarm.part is not Part.OVER:
+            await self._catch_up()
             try:
                 self._tick(k, each_tick)
             except RecordError as error:
@@ -282,9 +292,24 @@ class LiveLoop:
                 deadline = loop.time()
             await asyncio.sleep(max(0.0, deadline - loop.time()))
 
+    async def _catch_up(self) -> None:
+        """Go on at once, or, after a standstill, when what is known of the vehicles is of now again."""
+        now = self._link.clock.now()
+        stood_s = now - self._ticked_at
+        self._ticked_at = now
+        if stood_s < STOOD_STILL_S:
+            return
+        self._swarm.stood_still(now, stood_s)
+        waking = Waking(self._link.sessions, now, stood_s, self._link_loss_s)
+        while not waking.over(self._link.poll()):
+            await asyncio.sleep(POLL_S / self._link.clock.speed)
+        self._ticked_at = self._link.clock.now()
+
     def _tick(self, k: int, each_tick: Callable[[float], None]) -> None:
         now = self._link.poll()
         self._swarm.tick(k, now)
+        if self._link.clock.now() - now >= STOOD_STILL_S:  # in the midst of it: these setpoints are of before
+            self._link.discard()
         self._link.flush(now)
         self._track.add(now, self._poses())
         self._journal.breathe(now)

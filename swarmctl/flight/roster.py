@@ -14,6 +14,8 @@ from swarmctl.vehicle.session import OrderError, Session
 
 EARS = ("sensor_range", "alarms_per_second", "radio_range")
 """What a vehicle that dropped out has no more."""
+AIRBORNE = frozenset((*range(stages.TAKE_OFF, stages.LANDED), *range(stages.ADRIFT, len(stages.NAMES))))
+"""As `stages.airborne` says, which would first be compiled, in the air, with nobody steering meanwhile."""
 LOW_M = 0.5
 NOT_OURS = (Phase.RELEASED, Phase.FAILED, Phase.LOST)
 LANDINGS_ASKED = 3
@@ -64,7 +66,7 @@ class Roster:
 
     def flies(self, i: int) -> bool:
         """Whether the vehicle is in the air, as far as is known."""
-        return bool(stages.airborne(int(self._world.errands["stage"][i])))
+        return int(self._world.errands["stage"][i]) in AIRBORNE
 
     def aloft(self, i: int) -> bool:
         """The same, of one that dropped out."""

@@ -8,8 +8,11 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 
+import shapely
+
 from swarmctl.core import stages
 from swarmctl.core.world import World
+from swarmctl.mission.geometry import regions
 from swarmctl.mission.model import Mission
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.session import OrderError, Session
@@ -47,6 +50,7 @@ class Supervision:
         self._told_to_land: set[int] = set()
         self._watched_since: float | None = None
         self._returns_since: float | None = None
+        self._area = regions(mission, margin_m=0.0).legal
         edges = world.fences.raw
         diagonal = math.hypot(*(edges[:, :2].max(axis=0) - edges[:, :2].min(axis=0)))
         slowest = float(world.fleet["speed"].min())
@@ -62,6 +66,19 @@ class Supervision:
                 self._battery_low[i] = True
                 self._world.orders[i] = 1
                 self._note(i, now, "battery", f"battery at {percent} %: returns")
+
+    def require_inside(self, i: int) -> None:
+        """A vehicle may be taken only from a place that the mission allows.  Raises OrderError.
+
+        From elsewhere no way back is known to be clear, and what its own fence has ordered is not to be undone.
+        """
+        pose = self._world.poses[i]
+        away_m = self._area.distance(shapely.Point(float(pose["east"]), float(pose["north"])))
+        if away_m > 0.0:
+            raise OrderError(
+                f"vehicle {self._sessions[i].system}: cannot be retaken, it is {away_m:.1f} m outside the mission's "
+                "fence; bring it inside first, or have it land"
+            )
 
     def exhausted(self) -> list[int]:
         """Rows of those whose battery may give out at any moment, and that fly our setpoints."""

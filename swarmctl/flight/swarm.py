@@ -46,8 +46,6 @@ from .supervision import SEARCHING, Supervision
 from .taking_back import Resumed, TakingBack, whereabouts
 
 QUIET = (EventKind.PHASE, EventKind.TEXT)
-
-
 FAILURES = (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST)
 SEARCHING_SOON = (*SEARCHING, stages.TAKEN, stages.LEVEL)
 
@@ -168,10 +166,15 @@ class Swarm:
 
     def retake(self, i: int, now: float) -> None:
         """Take a released vehicle back: it searches on, or returns when the others do.  Raises OrderError."""
+        self._supervision.require_inside(i)
         self._sessions[i].retake()
         self._note(i, now, "retake", "retaken by the operator")
-        if self.part is Part.WATCHING:
-            self.part = Part.RETURNING
+        self._return_if_alone()
+
+    def stood_still(self, now: float, stood_s: float) -> None:
+        """The controller itself was silent for ``stood_s``."""
+        for i in filter(self.roster.flies, range(len(self._sessions))):
+            self._note(i, now, "standstill", f"the controller stood still for {stood_s:.1f} s")
 
     def _note(self, i: int, now: float, kind: str, text: str) -> None:
         """Something that the swarm did with one vehicle, for the recording and for people."""
@@ -230,6 +233,12 @@ class Swarm:
         """A vehicle that was silent speaks again: it belongs to the swarm, unless that took off without it."""
         if self.roster.dropped[i] == "lost" and self.roster.flies(i):
             self.roster.take_back(i)
+            self._return_if_alone()
+
+    def _return_if_alone(self) -> None:
+        """One is ours again: if all others are down, it is to come home."""
+        if self.part is Part.WATCHING:
+            self.part = Part.RETURNING
 
     def _supervise(self, now: float) -> None:
         """Heed what no session tells."""

@@ -1,6 +1,5 @@
 """From the messages that every firmware sends alike to telemetry: units, signs and axes."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,11 +14,8 @@ LEAST_AGE_S = 0.002
 """Less is the clocks' own millisecond."""
 
 
-def read_position(telemetry: Telemetry, fields: Any, now: float, longest_way_s: float = math.inf) -> None:
-    """GLOBAL_POSITION_INT: mm, and cm/s north, east, down.  0, 0 is what some firmwares say before a fix.
-
-    ``longest_way_s``: it was under way no longer than that.
-    """
+def read_position(telemetry: Telemetry, fields: Any, now: float) -> None:
+    """GLOBAL_POSITION_INT: mm, and cm/s north, east, down.  0, 0 is what some firmwares say before a fix."""
     if fields.lat == 0 and fields.lon == 0:
         return
     telemetry.lat_e7 = fields.lat
@@ -28,22 +24,27 @@ def read_position(telemetry: Telemetry, fields: Any, now: float, longest_way_s: 
     telemetry.height_m, telemetry.v_east, telemetry.v_north, telemetry.v_up = in_si(
         fields.relative_alt, fields.vx, fields.vy, fields.vz
     )
-    _date(telemetry, fields.time_boot_ms, now, longest_way_s)
+    _date(telemetry, fields.time_boot_ms, now)
     telemetry.received_at = now
 
 
-def _date(telemetry: Telemetry, boot_ms: int, now: float, longest_way_s: float) -> None:
-    """How long the position was under way, by the vehicle's own clock; clocks may drift apart a little.
-
-    A simulator's may fall behind by seconds when its computer is busy: what looks like age then is none.
-    """
+def _date(telemetry: Telemetry, boot_ms: int, now: float) -> None:
+    """How long the position was under way, by the vehicle's own clock; clocks may drift apart a little."""
     offset = now - boot_ms / 1000.0
     since_s = max(boot_ms - telemetry.boot_ms, 0) / 1000.0
-    least = min(telemetry.clock_offset_s + DRIFT * since_s, offset)
-    telemetry.clock_offset_s = max(least, offset - longest_way_s)
+    telemetry.clock_offset_s = min(telemetry.clock_offset_s + DRIFT * since_s, offset)
     age = offset - telemetry.clock_offset_s
     telemetry.age_s = age if age > LEAST_AGE_S else 0.0
     telemetry.boot_ms = boot_ms
+
+
+def read_clock(telemetry: Telemetry, asked_at: float, vehicle_s: float) -> None:
+    """A ping that left at ``asked_at`` was answered when the vehicle's clock showed ``vehicle_s``.
+
+    So the clocks are at least so far apart by now.  A simulator that cannot keep up falls behind by seconds in a
+    flight, and without this its positions would seem ever older.
+    """
+    telemetry.clock_offset_s = max(telemetry.clock_offset_s, asked_at - vehicle_s)
 
 
 def read_heartbeat(telemetry: Telemetry, fields: Any) -> None:

@@ -33,8 +33,8 @@ from .machine import Machine
 from .phases import FLYING, SET_UP, TABLE, Phase, Signal
 from .preflight import Preflight
 from .protection import Protection
-from .reading import READERS, read_position
-from .statistics import Statistics
+from .reading import READERS, read_clock, read_position
+from .statistics import NANOSECONDS, Statistics
 from .steps import TIME_SLACK_S
 from .watch import RESTART_MS
 
@@ -65,7 +65,7 @@ class Session(Machine):
             self._heard_at = now
             if frame.message_id == GLOBAL_POSITION_INT:
                 booted_ms = self.telemetry.boot_ms
-                read_position(self.telemetry, frame.fields, now, self._tally.longest_way_s(now))
+                read_position(self.telemetry, frame.fields, now)
                 if self.telemetry.boot_ms < booted_ms - RESTART_MS:
                     self.telemetry.forget_clock()
                     self._restarted()
@@ -89,6 +89,15 @@ class Session(Machine):
             self._signal(Signal.LINK_LOST)
         if self._procedure is not None:
             self._advance()
+        self._schedule()
+
+    def excuse_silence(self, now: float) -> None:
+        """The caller stood still until ``now``: what did not come, or was not done, was not the vehicle's fault."""
+        self._now = self._heard_at = self._beat_at = now
+        self._answered_at = None if self._answered_at is None else now
+        self._watch.forgive()
+        if self._procedure is not None:
+            self._procedure.begin_step(now)
         self._schedule()
 
     def check(self, preflight: Preflight) -> None:
@@ -231,6 +240,11 @@ class Session(Machine):
         return self._tally.figures(self._link)
 
     @property
+    def beat_at(self) -> float:
+        """When the last heartbeat came, or was excused."""
+        return self._beat_at
+
+    @property
     def loss(self) -> float:
         """The share of this vehicle's messages that got lost on the way, so far."""
         return self._link.lost / max(self._link.lost + self._link.received, 1)
@@ -291,6 +305,7 @@ class Session(Machine):
         elif frame.message_id == TIMESYNC:
             if self._tally.pong(frame.fields, self._now):
                 self._answered_at = self._now
+                read_clock(self.telemetry, frame.fields.ts1 / NANOSECONDS, frame.fields.tc1 / NANOSECONDS)
         else:
             self._read_exchange(frame)
         if self._watch.battery_low(self.telemetry):

@@ -16,7 +16,6 @@ from swarmctl.mavlink.signing import Verdict
 from .link import Link
 
 NANOSECONDS = 1e9
-RECENT_PINGS = 3
 PINGS_KEPT = 16  #: an answer later than so many further pings counts for nothing
 
 
@@ -82,13 +81,6 @@ class Tally:
         self._unanswered.remove(fields.ts1)
         self.pings_s.append(now - fields.ts1 / NANOSECONDS)
         return True
-
-    def longest_way_s(self, now: float) -> float:
-        """Longer nothing was under way of late: the slowest of the last round trips, or what is waited for still."""
-        if not self.pings_s:
-            return math.inf
-        waiting_s = now - self._unanswered[0] / NANOSECONDS if self._unanswered else 0.0
-        return max(*self.pings_s[-RECENT_PINGS:], waiting_s)
 
     def setpoint(self, now: float) -> None:
         """A setpoint is sent."""

@@ -120,7 +120,7 @@ def test_a_fence_holds_it_just_outside(rig: Rig, tmp_path: Path) -> None:
     take_off(fleet, mavproxy, 10.0)
     mavproxy.type(guided(90.0, 0.0, GROUND_M + 10.0))
     fleet.until(lambda: fleet.furthest_m > 40.0, SOON_S)
-    mavproxy.hear("Geofence violated")
+    mavproxy.hear("approaching or outside geofence")
     fleet.let_pass(15.0)
     assert fleet.mode == LOITER
     assert fleet.furthest_m < 70.0

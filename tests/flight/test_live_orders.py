@@ -1,11 +1,14 @@
 """What the operator orders of single vehicles, who is refused before arming, and a controller in trouble."""
 
+import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from swarmctl.core.calls import to_geodetic
 from swarmctl.flight import swarm as swarm_module
 from swarmctl.flight.control import ControlError
 from swarmctl.flight.errors import RefusedError
@@ -19,6 +22,7 @@ from swarmctl.record.replay import replay
 from swarmctl.record.tlog import TlogWriter
 from swarmctl.vehicle.addresses import Address
 
+from .flown import ORIGIN
 from .virtual import PLACES_M, Live, events, outcomes
 
 POSCTL = 3.0
@@ -46,6 +50,41 @@ def pilot_takes(system: int, mode: float = POSCTL, sub: float = 0.0) -> Callable
         live.wires.send(system, Encoder(200, 190).encode(message))
 
     return take
+
+
+def pilot_flies(system: int, east: float, north: float) -> Callable[[Live], None]:
+    """A pilot's ground station sends a vehicle somewhere at its altitude."""
+
+    def fly(live: Live) -> None:
+        lat, lon = to_geodetic(east, north, *ORIGIN)[:2]
+        message = mav.MAVLink_command_int_message(
+            system, 1, mav.MAV_FRAME_GLOBAL, mav.MAV_CMD_DO_REPOSITION, 0, 0,
+            -1.0, mav.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0.0, math.nan, round(lat * 1e7), round(lon * 1e7), math.nan,
+        )  # fmt: skip
+        live.wires.send(system, Encoder(200, 190).encode(message))
+
+    return fly
+
+
+def test_a_vehicle_is_retaken_inside_the_missions_fence_only(tmp_path: Path) -> None:
+    refused: list[str] = []
+
+    def try_to_retake(live: Live) -> None:
+        with pytest.raises(ControlError) as error:
+            order("retake 2")(live)
+        refused.append(str(error.value))
+
+    live = Live(tmp_path, {"safety.if_one_fails": "continue", "vehicles.speed_mps": 8.0})
+    live.at = [
+        (50.0, pilot_flies(2, -40.0, 60.0)),
+        (100.0, try_to_retake),
+        (101.0, pilot_flies(2, 60.0, 60.0)),
+        (140.0, order("retake 2")),
+    ]
+    outcome = live.fly()
+    assert re.search(r"vehicle 2: cannot be retaken, it is \d+\.\d m outside the mission's fence", refused[0])
+    assert (outcomes(outcome), all(live.down)) == (["landed"] * 3, True)
+    assert events(outcome, 2).count("retaken by the operator") == 1
 
 
 def test_a_vehicle_taken_over_is_retaken_by_order_only(tmp_path: Path) -> None:

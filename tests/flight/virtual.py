@@ -62,6 +62,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Seconds."""
         return self._jumping.now
 
+    def stand_still(self, seconds: float) -> None:
+        """Time passes, and nobody here notices."""
+        self._jumping.now += seconds
+
 
 def run(work: Coroutine[Any, Any, T]) -> T:
     """Run ``work`` to its end in virtual time."""
@@ -145,6 +149,20 @@ class StubWires:
         if any(True for _ in self._decoders[system].feed(data)):
             self._heard.add(system)
         self._deliver(system, data)
+
+    def stop_controller(self, seconds: float, kept: int = 10_000) -> None:
+        """The vehicles fly on; of what each says meanwhile, the first ``kept`` frames wait to be read."""
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        waiting: dict[int, list[bytes]] = {vehicle.system: [] for vehicle in self.fleet.vehicles}
+        for _ in range(round(seconds / STEP_S)):
+            loop.stand_still(STEP_S)
+            self.fleet.advance(loop.time())
+            for vehicle in self.fleet.vehicles:
+                waiting[vehicle.system] += vehicle.outgoing()
+        for system, frames in waiting.items():
+            for data in frames[:kept]:
+                self._deliver(system, data)
 
 
 @dataclass

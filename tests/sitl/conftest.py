@@ -48,7 +48,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def simulators(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Simulators]:
     """No instance yet; all that a test starts are stopped."""
     option = request.config.getoption
-    found = Simulators(tmp_path / "sitl", option("--px4"), option("--arducopter"))
+    first = int(os.environ.get("SITL_FIRST", "0"))
+    found = Simulators(tmp_path / "sitl", option("--px4"), option("--arducopter"), first)
     yield found
     found.stop()
 

@@ -13,10 +13,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .pilot import Pilot
+
 LAT, LON, ALT_M = 47.397742, 8.545594, 488.0
 SPACING_M = 20.0
 EAST_DEG_PER_M = 1.0 / (111_194.9 * math.cos(math.radians(LAT)))
 PX4_PORT, PX4_SHARED_PORT, ARDUPILOT_TCP_PORT = 14540, 14550, 5760
+PX4_GROUND_PORT, ARDUPILOT_PILOT_PORT = 18570, 14640
 STOP_S = 10.0
 
 # Without these ArduCopter's simulator has no frame and no calibration, and never arms.
@@ -35,11 +38,15 @@ ARDUCOPTER_NEEDS = {
 
 @dataclass
 class Simulators:
-    """Starts instances below ``folder``, and stops them all."""
+    """Starts instances below ``folder``, and stops them all.
+
+    ``first`` is added to every instance's number, and so to its ids and ports, where others fly on this machine too.
+    """
 
     folder: Path
     px4: Path | None
     arducopter: Path | None
+    first: int = 0
     running: dict[int, "subprocess.Popen[bytes]"] = field(default_factory=dict)  #: by system id
 
     def start_px4(
@@ -47,7 +54,8 @@ class Simulators:
     ) -> str:
         """Instance ``number``, system id one more; the URL of its own port.  It also sends to 14550."""
         assert self.px4 is not None
-        lat, lon = _place(number)
+        lat, lon = place(number)
+        number += self.first
         given = {f"PX4_PARAM_{name}": f"{value:g}" for name, value in (parameters or {}).items()}
         environment = {
             **os.environ,
@@ -70,7 +78,8 @@ class Simulators:
     ) -> str:  # fmt: skip
         """Instance ``number``, system id one more, sending to UDP ``port``, or waiting on TCP; its URL."""
         assert self.arducopter is not None
-        lat, lon = _place(number)
+        lat, lon = place(number)
+        number += self.first
         folder = self._folder(f"arducopter_{number}")
         lines = {**ARDUCOPTER_NEEDS, **(parameters or {})}
         (folder / "swarm.parm").write_text("".join(f"{k} {v:g}\n" for k, v in lines.items()))
@@ -78,12 +87,20 @@ class Simulators:
         command = [
             self.arducopter, "-w", "--model", "+", "--speedup", f"{speed:g}", "--defaults", "swarm.parm",
             "--home", f"{lat:.7f},{lon:.7f},{ALT_M:g},0", f"-I{number}", "--sysid", str(number + 1),
-            "--serial0", serial, "--serial1", "none", "--serial2", "none",
+            "--serial0", serial, "--serial1", f"udpclient:127.0.0.1:{ARDUPILOT_PILOT_PORT + number}",
+            "--serial2", "none",
         ]  # fmt: skip
         self._start(number + 1, folder.name, command, dict(os.environ))
         if port is None:
             return f"tcp://127.0.0.1:{ARDUPILOT_TCP_PORT + 10 * number}"
         return f"udpin://0.0.0.0:{port}"
+
+    def pilot(self, firmware: str, number: int) -> Pilot:
+        """A second ground station on instance ``number``: PX4's own port for one, ArduCopter's second serial port."""
+        number += self.first
+        if firmware == "px4":
+            return Pilot(firmware, number + 1, peer=PX4_GROUND_PORT + number)
+        return Pilot(firmware, number + 1, port=ARDUPILOT_PILOT_PORT + number)
 
     def kill(self, system: int) -> None:
         """As a crash does."""
@@ -118,6 +135,6 @@ class Simulators:
         return folder
 
 
-def _place(number: int) -> tuple[float, float]:
+def place(number: int) -> tuple[float, float]:
     """Latitude and longitude of an instance."""
     return LAT, LON + number * SPACING_M * EAST_DEG_PER_M

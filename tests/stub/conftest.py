@@ -10,6 +10,7 @@ import pytest
 from sim_vehicle_stub.chatter import MESSAGES
 from sim_vehicle_stub.fleet import StubFleet
 from sim_vehicle_stub.pilot import Limits
+from swarmctl.core.geodesy import to_geodetic
 from swarmctl.mavlink.codec import Decoder, Encoder, Frame
 from swarmctl.mavlink.dialect import mav
 
@@ -133,6 +134,19 @@ class Station:
                 0, 1, 1, frame, mask, xy[0], xy[1], z, v_north, v_east, vz, 0.0, 0.0, 0.0, yaw, 0.0
             )
         )
+
+    def put_fence(self, west: float, east: float) -> int:
+        """A box on board, 100 m from north to south; the result that it is acknowledged with."""
+        corners = [to_geodetic(e, n, *ORIGIN) for e, n in ((west, -50), (east, -50), (east, 50), (west, 50))]
+        self.send(mav.MAVLink_mission_count_message(1, 1, 4, mav.MAV_MISSION_TYPE_FENCE))
+        for number, (lat, lon) in enumerate(corners):
+            self.send(
+                mav.MAVLink_mission_item_int_message(
+                    1, 1, number, 0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, 0, 0, 4, 0, 0, 0,
+                    round(lat * 1e7), round(lon * 1e7), 0, mav.MAV_MISSION_TYPE_FENCE,
+                )
+            )  # fmt: skip
+        return int(self.last(47).type)
 
     def all(self, message_id: int) -> list[tuple[float, Any]]:
         return [(time, frame.fields) for time, frame in self.heard if frame.message_id == message_id]

@@ -276,7 +276,7 @@ def test_a_breach_without_avoidance_is_told_and_not_fought() -> None:
     flight.command(0.0, 8.0)
     flight.until_phase(Phase.RELEASED, 60.0)
     assert flight.session.reason == "vehicle 1: its mode became RTL while engaged"
-    assert "Fence Breached" in flight.texts(EventKind.TEXT)
+    assert "Polygon fence breached" in flight.texts(EventKind.TEXT)
     flight.check_not_fought(5.0)
 
 

@@ -274,7 +274,7 @@ def test_a_fence_that_only_warns_is_told_and_flown_through() -> None:
     flight = fly_out(1)
     flight.run(3.0)
     assert flight.session.phase is Phase.ENGAGED
-    assert "Geofence violated" in flight.texts(EventKind.TEXT)
+    assert "Geofence: approaching or outside geofence" in flight.texts(EventKind.TEXT)
 
 
 @pytest.mark.row("px4-fence")
