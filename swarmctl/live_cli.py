@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,7 @@ from .mission.model import Mission
 from .mission.scenario import Scenario
 from .record.folder import RunFolder
 from .vehicle.addresses import Address, AddressError, parse
+from .vehicle.backend import Backend, Mavlink
 
 FIRST_PORT, LAST_PORT = 20000, 28000
 OWN_PORT_OFFSET = 1000
@@ -31,13 +32,15 @@ STUB_CONNECT_S = 30.0
 
 
 def fly_with_stubs(
-    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, progress: Progress
-) -> Outcome:
+    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, progress: Progress,
+    backend: Callable[[], Backend] = Mavlink,
+) -> Outcome:  # fmt: skip
     """Fly in wall time, times ``speed``, with stub vehicles in a process of their own, over UDP."""
     with stub_process(mission, seed, speed) as port:
         options = LiveOptions(
             [[Address("udpin", "127.0.0.1", port + i)] for i in range(len(mission.fleet))],
             speed=speed, connect_timeout_s=STUB_CONNECT_S, own_stubs=True, watching=progress.preparing,
+            backend=backend,
         )  # fmt: skip
         return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
@@ -50,6 +53,21 @@ class Reach:
     timeout_s: float = 20.0
     backend: str = "mavlink"
     signing_key: Path | None = None
+
+
+def backend(reach: Reach) -> Callable[[], Backend]:
+    """Who speaks to the vehicles.  Raises UsageError where MAVSDK is wanted and cannot do it."""
+    if reach.backend == "mavlink":
+        return Mavlink
+    if reach.signing_key is not None:
+        raise click.UsageError("MAVSDK cannot sign what it sends: --signing-key needs --backend mavlink")
+    try:
+        from .vehicle.mavsdk_session import MavsdkBackend
+    except ImportError as error:
+        raise click.UsageError(
+            f"--backend mavsdk needs MAVSDK 4.1 (pip install 'mavsdk>=4.1,<5'): {error}"
+        ) from None
+    return MavsdkBackend
 
 
 def fly_connected(
@@ -65,7 +83,7 @@ def fly_connected(
 
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s, confirm=confirm,
-        watching=progress.preparing, adapt=adapt,
+        watching=progress.preparing, adapt=adapt, backend=backend(reach),
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
@@ -73,8 +91,9 @@ def fly_connected(
 def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Progress) -> bool:
     """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError."""
     options = LiveOptions(
-        addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing
-    )
+        addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing,
+        backend=backend(reach),
+    )  # fmt: skip
     preparation, ways = asyncio.run(probe(mission, options, orders))
     rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))
     click.echo(findings_table(f"{mission.name}: nothing was armed", rows))
@@ -92,7 +111,11 @@ def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
 
 
 def connects(mission: Mission, reach: Reach) -> bool:
-    """Whether real vehicles are meant.  Raises AddressError for a bad URL, or where only some vehicles have one."""
+    """Whether real vehicles are meant.
+
+    Raises AddressError for a bad URL, or where only some vehicles have one, and UsageError as `backend` does.
+    """
+    backend(reach)
     for url in reach.urls:
         parse(url)
     named = [vehicle.connect is not None for vehicle in mission.fleet]

@@ -14,6 +14,7 @@ from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
 from swarmctl.record.folder import RunFolder
 from swarmctl.vehicle.addresses import Address
+from swarmctl.vehicle.backend import Backend, Mavlink
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.switchboard import Switchboard
 
@@ -56,6 +57,7 @@ class LiveOptions:
     confirm: Callable[[Preparation], "asyncio.Future[bool]"] | None = None  #: asked before anything is armed
     watching: Watching = lambda now, sessions: None
     wires: Callable[[], Wires] = field(default=Switchboard)
+    backend: Callable[[], Backend] = field(default=Mavlink)
 
 
 async def fly_live(
@@ -106,7 +108,7 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
             raise StoppedError("stopped before anything was armed")
         options.watching(now, sessions)
 
-    return LiveLink(FlightClock(options.speed), options.wires(), look)
+    return LiveLink(FlightClock(options.speed), options.wires(), look, options.backend())
 
 
 async def _prepared(mission: Mission, link: LiveLink, options: LiveOptions) -> Preparation:

@@ -16,6 +16,7 @@ from swarmctl.mavlink.codec import Encoder
 from swarmctl.mavlink.dialect import mav
 from swarmctl.record.errors import RecordError
 from swarmctl.vehicle.addresses import Address
+from swarmctl.vehicle.backend import Backend
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
 from swarmctl.vehicle.phases import FLYING
 from swarmctl.vehicle.session import Session
@@ -86,12 +87,17 @@ class LiveLink:
     """
 
     def __init__(
-        self, clock: FlightClock, wires: Wires, look: Callable[[float, Sequence[Session]], None]
+        self,
+        clock: FlightClock,
+        wires: Wires,
+        look: Callable[[float, Sequence[Session]], None],
+        backend: Backend,
     ) -> None:
         self.clock = clock
         self.sessions: list[Session] = []
         self.wires = wires
         self._look = look
+        self._backend = backend
         self._by_system: dict[int, Session] = {}
         self._early: list[tuple[float, list[bytes]]] = []
         self._journal: Journal | None = None
@@ -116,10 +122,19 @@ class LiveLink:
             )
         for system in systems:
             assert system is not None
-            session = Session(system, settings=settings, now=self.clock.now())
-            self.sessions.append(session)
-            self._by_system[system] = session
+            self._add(system, settings)
         self.wires.subscribe(self._take)
+
+    def _add(self, system: int, settings: SessionSettings) -> None:
+        """The session of one vehicle, which may wake us from any thread."""
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            loop.call_soon_threadsafe(self._woken, system)
+
+        session = self._backend.session(system, settings, self.clock.now(), wake)
+        self.sessions.append(session)
+        self._by_system[system] = session
 
     def _assign(self, addresses: Sequence[Sequence[Address]]) -> list[int | None]:
         """For each vehicle the lowest system id heard at its addresses and not given away yet."""
@@ -186,8 +201,15 @@ class LiveLink:
             self._record(session, now)
 
     def close(self) -> None:
-        """Close every wire."""
+        """Close every wire, and what is behind the sessions."""
         self.wires.close()
+        self._backend.close()
+
+    def _woken(self, system: int) -> None:
+        """A session has something to send, or to do."""
+        session = self._by_system[system]
+        session.poll(self.clock.now())
+        self._send(session)
 
     def _take(self, system: int, data: bytes) -> None:
         session = self._by_system.get(system)
