@@ -1,9 +1,11 @@
 """Live flight at 1 × over UDP: how regular setpoints are, what the controller costs, how soon all are down.
 
-    python benchmarks/live.py [--vehicles 6 100] [--seconds 60] [--rates 10 20] [--mavsdk 50]
+    python benchmarks/live.py [--vehicles 6 100] [--seconds 60] [--rates 10 20]
+                              [--backends mavlink mavsdk] [--mavsdk 50]
 
 Flies `swarmctl fly --speed 1` inside this process with its stub vehicles in another, and counts this process's
-own time from the barrier to the end of the search, planners on.  ``--mavsdk N`` prints beside it what MAVSDK
+own time from the barrier to the end of the search, planners on; with ``--backends mavlink mavsdk`` once by either
+backend, one after the other.  ``--mavsdk N`` prints beside it what MAVSDK
 takes to send bare velocity setpoints to N stub vehicles at 20 Hz (no planner, no guard, no recording).
 """
 
@@ -22,7 +24,7 @@ from swarmctl.dashboard import Progress
 from swarmctl.flight.fly import warm_up
 from swarmctl.flight.orders import Orders
 from swarmctl.flight.swarm import Part, Swarm
-from swarmctl.live_cli import fly_with_stubs
+from swarmctl.live_cli import Reach, backend, fly_with_stubs
 from swarmctl.mission.load import load
 from swarmctl.record.folder import RunFolder
 
@@ -37,7 +39,7 @@ radio: {range_m: 200}
 targets: {clusters: 6, count: 200, radius_m: 60}
 """
 HEADER = (
-    f"{'':24}{'p50 ms':>9}{'p99 ms':>9}{'max ms':>9}{'core %':>9}{'round trip ms':>15}"
+    f"{'':32}{'p50 ms':>9}{'p99 ms':>9}{'max ms':>9}{'core %':>9}{'round trip ms':>15}"
     f"{'down after s':>14}{'nearest m':>11}"
 )
 
@@ -64,7 +66,7 @@ class Account(Progress):
         return self.spent[Part.OVER][0] - self.spent[Part.RETURNING][0]
 
 
-def fly(vehicles: int, seconds: float, rate_hz: float, algorithm: str) -> dict[str, Any]:
+def fly(vehicles: int, seconds: float, rate_hz: float, algorithm: str, by: str = "mavlink") -> dict[str, Any]:
     """One flight's figures."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
@@ -77,13 +79,13 @@ def fly(vehicles: int, seconds: float, rate_hz: float, algorithm: str) -> dict[s
         warm_up(mission, algorithm)
         account = Account()
         run = RunFolder.create(path / "run", algorithm=algorithm, now=None)  # type: ignore[arg-type]
-        outcome = fly_with_stubs(mission, 1, run, 1.0, Orders(), account)
+        outcome = fly_with_stubs(mission, 1, run, 1.0, Orders(), account, backend(Reach(backend=by)))
     for line in outcome.complaints():
         print(line, file=sys.stderr)
     intervals = np.concatenate([np.asarray(s.setpoint_intervals_s) for s in outcome.sessions]) * 1e3
     trips = [s.statistics().round_trip for s in outcome.sessions]
     return {
-        "vehicles": vehicles, "rate_hz": rate_hz, "p50_ms": float(np.percentile(intervals, 50)),
+        "vehicles": vehicles, "backend": by, "rate_hz": rate_hz, "p50_ms": float(np.percentile(intervals, 50)),
         "p99_ms": float(np.percentile(intervals, 99)), "max_ms": float(intervals.max()),
         "core": account.share_of_a_core(), "down_s": account.landing_s(),
         "round_trip_ms": 1e3 * float(np.median([t.median_s for t in trips if t])),
@@ -100,6 +102,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0, help="length of the search")
     parser.add_argument("--rates", type=float, nargs="+", default=[10.0, 20.0], help="setpoints a second")
     parser.add_argument("--algo", default="fco")
+    parser.add_argument("--backends", nargs="+", choices=["mavlink", "mavsdk"], default=["mavlink"])
     parser.add_argument("--mavsdk", type=int, default=0, metavar="N", help="drive N vehicles by MAVSDK too")
     parser.add_argument("--json", action="store_true", help="print JSON lines instead")
     arguments = parser.parse_args()
@@ -107,13 +110,14 @@ def main() -> None:
         print(HEADER)
     for vehicles in arguments.vehicles:
         for rate_hz in arguments.rates:
-            show(fly(vehicles, arguments.seconds, rate_hz, arguments.algo), arguments.json)
+            for by in arguments.backends:
+                show(fly(vehicles, arguments.seconds, rate_hz, arguments.algo, by), arguments.json)
     if arguments.mavsdk:
         import mavsdk_fleet
 
         figures = mavsdk_fleet.measure(arguments.mavsdk, 20.0, arguments.seconds)
         name = f"MAVSDK, {figures.vehicles} at 20 Hz"
-        print(f"{name:24}{figures.p50_ms:9.1f}{figures.p99_ms:9.1f}{'':9}{100 * figures.core_share:9.1f}")
+        print(f"{name:32}{figures.p50_ms:9.1f}{figures.p99_ms:9.1f}{'':9}{100 * figures.core_share:9.1f}")
 
 
 def show(figures: dict[str, Any], as_json: bool) -> None:
@@ -121,9 +125,9 @@ def show(figures: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print(json.dumps(figures), flush=True)
         return
-    name = f"{figures['vehicles']} vehicles, {figures['rate_hz']:g} Hz"
+    name = f"{figures['vehicles']} by {figures['backend']}, {figures['rate_hz']:g} Hz"
     print(
-        f"{name:24}{figures['p50_ms']:9.1f}{figures['p99_ms']:9.1f}{figures['max_ms']:9.1f}"
+        f"{name:32}{figures['p50_ms']:9.1f}{figures['p99_ms']:9.1f}{figures['max_ms']:9.1f}"
         f"{100 * figures['core']:9.1f}{figures['round_trip_ms']:15.1f}{figures['down_s']:14.0f}"
         f"{figures['nearest_m'] or 0:11.1f}" + ("" if figures["exit"] == 0 else f"  EXIT {figures['exit']}"),
         flush=True,

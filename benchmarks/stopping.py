@@ -18,6 +18,7 @@ from swarmctl.core.calls import to_local
 from swarmctl.core.guard import BRAKING_SHARE
 from swarmctl.flight.live import FlightClock, LiveLink
 from swarmctl.vehicle.addresses import parse
+from swarmctl.vehicle.backend import Mavlink
 from swarmctl.vehicle.phases import Phase
 from swarmctl.vehicle.preflight import Preflight
 from swarmctl.vehicle.session import Session
@@ -122,9 +123,9 @@ async def phase(link: LiveLink, session: Session, wanted: Phase) -> None:
 
 async def measure(options: argparse.Namespace) -> None:
     """Fly, and print a row a stop."""
-    link = LiveLink(FlightClock(options.speed), Switchboard(), lambda now, sessions: None)
+    link = LiveLink(FlightClock(options.speed), Switchboard(), lambda now, sessions: None, Mavlink())
     settings = SessionSettings(rate_hz=RATE_HZ)
-    await link.connect([parse(options.url)], settings, 30.0)
+    link.meet(await link.find([parse(options.url)], 30.0), settings)
     (session,) = link.sessions
     await phase(link, session, Phase.READY)
     session.check(Preflight(read_parameters=True))

@@ -25,6 +25,7 @@ from .fly_cli import fly, load_mission
 from .options import (
     PathArgument,
     algorithm_option,
+    backend_option,
     connect_option,
     mission_option,
     signing_option,
@@ -108,9 +109,10 @@ def control(run: Path, order: str, vehicle: int | None) -> None:
 @click.option("--vehicles", type=click.IntRange(1), help="How many vehicles.")
 @connect_option
 @timeout_option
+@backend_option
 @signing_option
 def check(
-    mission_file: Path | None, vehicles: int | None, urls: tuple[str, ...], connect_timeout: float,
+    mission_file: Path | None, vehicles: int | None, urls: tuple[str, ...], connect_timeout: float, backend: str,
     signing_key: Path | None,
 ) -> None:  # fmt: skip
     """Validate a mission and say what it is; with --connect, probe its vehicles too.  Arms nothing.
@@ -125,7 +127,7 @@ def check(
         mission = load_mission(mission_file, vehicles=vehicles)
         scenario = Scenario(mission, ideal=False)
         targets = len(scenario.scene(1).targets)
-        reach = live_cli.Reach(urls, connect_timeout, signing_key=signing_key)
+        reach = live_cli.Reach(urls, connect_timeout, backend, signing_key)
         real = live_cli.connects(mission, reach)
         click.echo(
             f"{mission.name}: valid. {len(mission.fleet)} vehicles, {mission.planner.algorithm}, "

@@ -92,6 +92,10 @@ def fly(
         mission = load_mission(mission_file, algorithm, vehicles, duration, autopilot)
         reach = live_cli.Reach(urls, connect_timeout, backend, signing_key)
         real = live_cli.connects(mission, reach)
+        if backend != "mavlink" and not real and speed is None:
+            raise click.UsageError(
+                "lockstep has no MAVSDK: --backend mavsdk needs --connect or --speed FACTOR"
+            )
         if real:
             mission = as_found(mission)
         else:
@@ -119,7 +123,9 @@ def fly(
                         adapt=adapt,
                     )
                 elif speed is not None:
-                    outcome = live_cli.fly_with_stubs(mission, seed, folder, speed, orders, progress)
+                    outcome = live_cli.fly_with_stubs(
+                        mission, seed, folder, speed, orders, progress, live_cli.backend(reach)
+                    )
                 else:
                     outcome = flight.fly(mission, seed, folder, _make_stubs, orders, progress.flying)
             conclude(outcome, folder, as_json)

@@ -28,6 +28,7 @@ from .mission.model import Mission
 from .mission.scenario import Scenario
 from .record.folder import RunFolder
 from .vehicle.addresses import Address, AddressError, parse
+from .vehicle.backend import Backend, Mavlink
 from .vehicle.keys import SigningKeyError, exposure, read_key, signing_with
 
 FIRST_PORT, LAST_PORT = 20000, 28000
@@ -36,13 +37,15 @@ STUB_CONNECT_S = 30.0
 
 
 def fly_with_stubs(
-    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, progress: Progress
-) -> Outcome:
+    mission: Mission, seed: int, folder: RunFolder, speed: float, orders: Orders, progress: Progress,
+    backend: Callable[[], Backend] = Mavlink,
+) -> Outcome:  # fmt: skip
     """Fly in wall time, times ``speed``, with stub vehicles in a process of their own, over UDP."""
     with stub_process(mission, seed, speed) as port:
         options = LiveOptions(
             [[Address("udpin", "127.0.0.1", port + i)] for i in range(len(mission.fleet))],
             speed=speed, connect_timeout_s=STUB_CONNECT_S, own_stubs=True, watching=progress.preparing,
+            backend=backend,
         )  # fmt: skip
         return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
@@ -66,6 +69,21 @@ class Reach:
         return signing_with(key, clock.utc_s)
 
 
+def backend(reach: Reach) -> Callable[[], Backend]:
+    """Who speaks to the vehicles.  Raises UsageError where MAVSDK is wanted and cannot do it."""
+    if reach.backend == "mavlink":
+        return Mavlink
+    if reach.signing_key is not None:
+        raise click.UsageError("MAVSDK cannot sign what it sends: --signing-key needs --backend mavlink")
+    try:
+        from .vehicle.mavsdk_session import MavsdkBackend
+    except ImportError as error:
+        raise click.UsageError(
+            f"--backend mavsdk needs MAVSDK 4.1 (pip install 'mavsdk>=4.1,<5'): {error}"
+        ) from None
+    return MavsdkBackend
+
+
 def fly_connected(
     mission: Mission, seed: int, folder: RunFolder, reach: Reach, orders: Orders, progress: Progress, *,
     speed: float, sure: bool, adapt: bool,
@@ -74,7 +92,7 @@ def fly_connected(
     options = LiveOptions(
         addresses(mission, reach.urls), speed=speed, connect_timeout_s=reach.timeout_s,
         confirm=confirming(progress, sure), watching=progress.preparing, adapt=adapt,
-        signing=reach.signing(progress), telling=progress.say,
+        signing=reach.signing(progress), telling=progress.say, backend=backend(reach),
     )  # fmt: skip
     return asyncio.run(fly_live(mission, seed, folder, options, orders, progress.flying))
 
@@ -99,7 +117,7 @@ def check_connected(mission: Mission, reach: Reach, orders: Orders, progress: Pr
     """Probe the vehicles and print what was found; whether all may be armed.  Raises AddressError, SigningKeyError."""
     options = LiveOptions(
         addresses(mission, reach.urls), connect_timeout_s=reach.timeout_s, watching=progress.preparing,
-        signing=reach.signing(progress), telling=progress.say,
+        signing=reach.signing(progress), telling=progress.say, backend=backend(reach),
     )  # fmt: skip
     preparation, ways = asyncio.run(probe(mission, options, orders))
     rows = list(zip(preparation.systems, ways, preparation.findings, strict=True))
@@ -120,8 +138,10 @@ def addresses(mission: Mission, urls: Sequence[str]) -> list[list[Address]]:
 def connects(mission: Mission, reach: Reach) -> bool:
     """Whether real vehicles are meant.
 
-    Raises AddressError for a bad URL, or where only some vehicles have one; SigningKeyError for a bad key.
+    Raises AddressError for a bad URL, or where only some vehicles have one, SigningKeyError for a bad key, and
+    UsageError as `backend` does.
     """
+    backend(reach)
     for url in reach.urls:
         parse(url)
     named = [vehicle.connect is not None for vehicle in mission.fleet]

@@ -16,6 +16,7 @@ from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
 from swarmctl.record.folder import RunFolder
 from swarmctl.vehicle.addresses import Address
+from swarmctl.vehicle.backend import Backend, Mavlink
 from swarmctl.vehicle.session import Session
 from swarmctl.vehicle.switchboard import Switchboard
 
@@ -66,6 +67,7 @@ class LiveOptions:
     telling: Callable[[str], None] = lambda text: None  #: told the budget of each wire
     signing: Signing | None = None  #: signs what is sent; what is not signed is not believed
     wires: Callable[[Signing | None], Wires] = field(default=Switchboard)
+    backend: Callable[[], Backend] = field(default=Mavlink)
 
 
 async def fly_live(
@@ -117,7 +119,8 @@ def _link(options: LiveOptions, orders: Orders) -> LiveLink:
             raise StoppedError(f"stopped before {what}")
         options.watching(now, sessions)
 
-    return LiveLink(FlightClock(options.speed), options.wires(options.signing), look, options.signing)
+    clock, wires = FlightClock(options.speed), options.wires(options.signing)
+    return LiveLink(clock, wires, look, options.backend(), options.signing)
 
 
 async def _prepared(

@@ -17,6 +17,7 @@ from swarmctl.mavlink.dialect import mav
 from swarmctl.mavlink.signing import Signing
 from swarmctl.record.errors import RecordError
 from swarmctl.vehicle.addresses import Address
+from swarmctl.vehicle.backend import Backend, Begins
 from swarmctl.vehicle.link import GROUND_COMPONENT, GROUND_SYSTEM
 from swarmctl.vehicle.phases import FLYING
 from swarmctl.vehicle.preflight import Preflight
@@ -104,13 +105,13 @@ class LiveLink:
 
     def __init__(
         self, clock: FlightClock, wires: Wires, look: Callable[[float, Sequence[Session]], None],
-        signing: Signing | None = None,
+        backend: Backend, signing: Signing | None = None,
     ) -> None:  # fmt: skip
         self.clock = clock
         self.sessions: list[Session] = []
         self.wires = wires
         self._look = look
-        self._signing = signing
+        self._backend, self._signing = backend, signing
         self._by_system: dict[int, Session] = {}
         self._early: list[tuple[float, list[bytes]]] = []
         self._journal: Journal | None = None
@@ -142,13 +143,20 @@ class LiveLink:
     def meet(self, systems: Sequence[int], settings: SessionSettings, known: Known | None = None) -> None:
         """Begin a session with each of these vehicles."""
         for system in systems:
-            session = Session(
-                system, settings=settings, now=self.clock.now(), preflight=known and known.preflight,
-                signing=self._signing, adopts=known is not None,
-            )  # fmt: skip
-            self.sessions.append(session)
-            self._by_system[system] = session
+            self._add(system, settings, known)
         self.wires.subscribe(self._take)
+
+    def _add(self, system: int, settings: SessionSettings, known: Known | None) -> None:
+        """The session of one vehicle, which may wake us from any thread."""
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            loop.call_soon_threadsafe(self._woken, system)
+
+        begins = Begins(known and known.preflight, self._signing, known is not None)
+        session = self._backend.session(system, settings, self.clock.now(), wake, begins)
+        self.sessions.append(session)
+        self._by_system[system] = session
 
     def _assign(self, addresses: Sequence[Sequence[Address]], known: Known | None) -> list[int | None]:
         """For each vehicle the lowest system id heard at its addresses and not given away yet, or its own."""
@@ -224,8 +232,15 @@ class LiveLink:
             session.outgoing()
 
     def close(self) -> None:
-        """Close every wire."""
+        """Close every wire, and what is behind the sessions."""
         self.wires.close()
+        self._backend.close()
+
+    def _woken(self, system: int) -> None:
+        """A session has something to send, or to do."""
+        session = self._by_system[system]
+        session.poll(self.clock.now())
+        self._send(session)
 
     def _take(self, system: int, data: bytes) -> None:
         session = self._by_system.get(system)

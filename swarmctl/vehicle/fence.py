@@ -173,6 +173,10 @@ class FenceTransfer:
         """MISSION_COUNT, which begins the upload."""
         return mav.MAVLink_mission_count_message(self._system, AUTOPILOT_COMPONENT, len(self.vertices), FENCE)
 
+    def items(self) -> list[Any]:
+        """MISSION_ITEM_INT of every vertex."""
+        return [self._item(number) for number in range(len(self.vertices))]
+
     def _item(self, number: int) -> Any:
         """MISSION_ITEM_INT."""
         vertex = self.vertices[number]

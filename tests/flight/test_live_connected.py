@@ -9,12 +9,18 @@ import pytest
 
 from swarmctl.live_cli import free_ports
 
-from .processes import GROUP, HOME, MISSION, PATIENCE_S, SPEED, Start, flown, read_until, write
-
-
-def fleet_of(*entries: str) -> str:
-    """A mission with one entry a vehicle."""
-    return MISSION + "vehicles:\n" + "".join(f"  - {{speed_mps: 8, altitude_m: 10, {e}}}\n" for e in entries)
+from .processes import (
+    GROUP,
+    HOME,
+    MISSION,
+    PATIENCE_S,
+    SPEED,
+    Start,
+    fleet_of,
+    flown,
+    read_until,
+    write,
+)
 
 
 def test_check_shows_what_it_found_and_arms_nothing(start: Start, stubs: Start, tmp_path: Path) -> None:

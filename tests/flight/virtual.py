@@ -54,22 +54,23 @@ class _Jumping(selectors.DefaultSelector):
 class VirtualLoop(asyncio.SelectorEventLoop):
     """An event loop on virtual time, from 0."""
 
-    def __init__(self) -> None:
-        self._jumping = _Jumping()
-        super().__init__(self._jumping)
+    def __init__(self, selector: Any = None) -> None:
+        self._selector_with_time = selector or _Jumping()
+        super().__init__(self._selector_with_time)
 
     def time(self) -> float:
         """Seconds."""
-        return self._jumping.now
+        now: float = self._selector_with_time.now
+        return now
 
     def stand_still(self, seconds: float) -> None:
         """Time passes, and nobody here notices."""
         self._jumping.now += seconds
 
 
-def run(work: Coroutine[Any, Any, T]) -> T:
+def run(work: Coroutine[Any, Any, T], loop: Callable[[], VirtualLoop] = VirtualLoop) -> T:
     """Run ``work`` to its end in virtual time."""
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+    with asyncio.Runner(loop_factory=loop) as runner:
         return runner.run(work)
 
 
@@ -182,6 +183,7 @@ class Live:
     seed: int | None = 5
     options: dict[str, Any] = field(default_factory=dict)
     stubs: dict[str, Any] = field(default_factory=dict)
+    loop: Callable[[], VirtualLoop] = VirtualLoop
     swarm: Swarm | None = None
     orders: Orders = field(default_factory=Orders)
     now: float = 0.0
@@ -232,7 +234,7 @@ class Live:
         )
 
         flight = fly_live(mission, 1, self.folder, options, self.orders, self._report)
-        return run(asyncio.wait_for(flight, LONGEST_S))
+        return run(asyncio.wait_for(flight, LONGEST_S), self.loop)
 
     def die(self) -> Path:
         """Kill the controller now, and let what was on disk by then be all that it leaves: in that folder."""
