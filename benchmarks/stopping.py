@@ -1,6 +1,6 @@
 """How a vehicle really stops, against what the guard assumes of it: one vehicle, real or simulated.
 
-    python benchmarks/stopping.py udpin://0.0.0.0:14540 [--speeds 2,4,8] [--speed FACTOR] [--altitude 20] [--yes]
+    python benchmarks/stopping.py udpin://0.0.0.0:14540 [--speeds 2,4,8] [--speed FACTOR] [--altitude 20]
 
 It takes off where it stands, flies east at each speed and is told to stop, then west; then it lands.  It needs
 ``--room`` metres (150) of free air east of it.  Distances are counted from where the vehicle was last known to be

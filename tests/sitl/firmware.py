@@ -33,6 +33,7 @@ ARDUCOPTER_NEEDS = {
     "MOT_THST_EXPO": 0.65,
     "MOT_THST_HOVER": 0.39,
     "BATT_MONITOR": 4,
+    "BATT_CAPACITY": 100_000,  # mAh: enough for all flights of a test
 }
 
 
