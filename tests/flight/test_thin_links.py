@@ -7,7 +7,6 @@ import pytest
 
 from swarmctl.flight.budget import Load, Rates, lowered, plan, stale_s
 from swarmctl.flight.errors import RefusedError
-from swarmctl.flight.fly_live import UNSURE_S
 from swarmctl.mavlink.signing import Signing, units
 from swarmctl.mission.model import Mission
 from swarmctl.vehicle.addresses import Address
@@ -135,7 +134,10 @@ def test_a_flight_stays_within_its_lines_budget(
     assert outcome.mission.setpoints.rate_hz == rates.setpoints
     world, stale = outcome.world, stale_s(rates)
     assert world.fleet["latency"].min() >= 0.3 + stale, "ArduPilot's own, the less of the two"
-    unsure_m = (UNSURE_S + stale) * float(world.fleet["speed"].max())
+    limits = [session.adapter.limits for session in outcome.sessions if session.adapter is not None]
+    unsure_m = max(
+        (one.unsure_s + stale) * float(speed) for one, speed in zip(limits, world.fleet["speed"], strict=True)
+    )
     assert world.rules["separation"] == pytest.approx(outcome.mission.safety.separation_m + unsure_m)
     (load,), wires = budget.loads, live.wires
     assert isinstance(wires, ThinWires)

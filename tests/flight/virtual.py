@@ -65,7 +65,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def stand_still(self, seconds: float) -> None:
         """Time passes, and nobody here notices."""
-        self._jumping.now += seconds
+        self._selector_with_time.now += seconds
 
 
 def run(work: Coroutine[Any, Any, T], loop: Callable[[], VirtualLoop] = VirtualLoop) -> T:
@@ -261,7 +261,10 @@ class Live:
         self.folder.path.mkdir()
         self.orders = Orders()
         wanted = LiveOptions(
-            [[address] for address in before.addresses], wires=lambda: self.wires, resumes=before, **options
+            [[address] for address in before.addresses],
+            wires=lambda signing: self.wires,
+            resumes=before,
+            **options,
         )
         flight = fly_live(before.mission, before.seed, self.folder, wanted, self.orders, self._report)
         return run(asyncio.wait_for(flight, LONGEST_S))
