@@ -1,5 +1,6 @@
 """Ten missions in a row by one process on the same six autopilots: nothing is left of a flight but its folder."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -45,6 +46,8 @@ def test_ten_missions_in_a_row(simulators: Simulators, firmware: str, tmp_path: 
         )  # fmt: skip
         is_safe(write_results(outcome, folder))
         assert outcome.exit_code() == 0
+        del outcome
+        gc.collect()  # pictures hold themselves in circles, which Python lets lie for several flights
         holds.append(held())
         memory.append(resident_mb())
         print(f"flight {flight + 1}: {holds[-1][0]} files, {holds[-1][1]} threads, {memory[-1]:.1f} MB")
