@@ -23,7 +23,8 @@ from swarmctl.core.world import World
 from swarmctl.dashboard import Progress
 from swarmctl.flight.fly import warm_up
 from swarmctl.flight.orders import Orders
-from swarmctl.flight.swarm import Part, Swarm
+from swarmctl.flight.parts import Part
+from swarmctl.flight.swarm import Swarm
 from swarmctl.live_cli import Reach, backend, fly_with_stubs
 from swarmctl.mission.load import load
 from swarmctl.record.folder import RunFolder

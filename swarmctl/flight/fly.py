@@ -22,9 +22,10 @@ from .errors import StoppedError
 from .journal import Journal
 from .lockstep import Lockstep, Vehicles
 from .orders import Orders
+from .parts import Part
 from .preparation import Preparation
 from .results import Outcome
-from .swarm import Part, Swarm
+from .swarm import Swarm
 from .track import Track
 
 REPORT_EVERY_S = 10.0

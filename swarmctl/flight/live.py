@@ -28,8 +28,9 @@ from swarmctl.vehicle.transports import TransportError
 from .adoption import Adoption
 from .errors import RefusedError, StoppedError
 from .journal import Journal
+from .parts import Part
 from .preparation import Preparation
-from .swarm import Part, Swarm
+from .swarm import Swarm
 from .track import Track
 from .waking import STOOD_STILL_S, Waking
 

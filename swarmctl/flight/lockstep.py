@@ -15,7 +15,8 @@ from swarmctl.vehicle.session import Session
 
 from .errors import FlightError
 from .journal import Journal
-from .swarm import Part, Swarm
+from .parts import Part
+from .swarm import Swarm
 from .track import Track
 
 LONGEST_EXTRA_S = 3600.0

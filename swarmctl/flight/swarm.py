@@ -24,7 +24,6 @@ is told to land once its own failsafe has had time to bring it home.
 """
 
 from collections.abc import Sequence
-from enum import Enum
 
 import numpy as np
 
@@ -40,6 +39,7 @@ from swarmctl.vehicle.session import Session
 from .errors import RefusedError
 from .following import Following
 from .journal import Journal
+from .parts import Part
 from .preparation import Preparation
 from .roster import Roster
 from .supervision import SEARCHING, Supervision
@@ -48,18 +48,6 @@ from .taking_back import Resumed, TakingBack, whereabouts
 QUIET = (EventKind.PHASE, EventKind.TEXT)
 FAILURES = (EventKind.FAILED, EventKind.RELEASED, EventKind.LOST)
 SEARCHING_SOON = (*SEARCHING, stages.TAKEN, stages.LEVEL)
-
-
-class Part(Enum):
-    """What the swarm as a whole is doing."""
-
-    PREPARING = "preparing"
-    TAKING_OFF = "taking off"
-    TAKING_BACK = "taking back"  #: those of a flight whose controller died
-    SEARCHING = "searching"
-    RETURNING = "returning"
-    WATCHING = "watching"  #: ours are down; somebody else's is still in the air
-    OVER = "over"
 
 
 class Swarm:

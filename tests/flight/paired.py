@@ -16,8 +16,9 @@ from swarmctl.core import stages
 from swarmctl.core.world import World
 from swarmctl.flight import fly as flight
 from swarmctl.flight.lockstep import Lockstep
+from swarmctl.flight.parts import Part
 from swarmctl.flight.preparation import Preparation
-from swarmctl.flight.swarm import Part, Swarm
+from swarmctl.flight.swarm import Swarm
 from swarmctl.mission.model import Mission
 from swarmctl.mission.scenario import Scenario
 from swarmctl.vehicle.session import Session

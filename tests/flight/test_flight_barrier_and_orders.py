@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from swarmctl.core import stages
 from swarmctl.core.world import World
 from swarmctl.flight.orders import Orders
-from swarmctl.flight.swarm import Part, Swarm
+from swarmctl.flight.parts import Part
+from swarmctl.flight.swarm import Swarm
 from swarmctl.record import mcap_read
 from swarmctl.record.replay import replay
 

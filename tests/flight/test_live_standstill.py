@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from swarmctl.core import stages
+from swarmctl.flight.parts import Part
 from swarmctl.flight.roster import AIRBORNE, Roster
-from swarmctl.flight.swarm import Part, Swarm
+from swarmctl.flight.swarm import Swarm
 
 from .virtual import Live, events, outcomes
 
